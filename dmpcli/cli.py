@@ -1,0 +1,60 @@
+"""The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
+
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from dmpcli import __version__
+from dmpcli.commands import execute, fit, generalize, inspect, record, report
+from dmpcli.errors import DmpError
+
+
+class Group(TyperGroup):
+    """Turns a user's mistake into one message and its exit code; a defect keeps its traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the subcommand."""
+        try:
+            return super().invoke(ctx)
+        except DmpError as error:
+            print(f"dmpcli: {error}", file=sys.stderr)  # noqa: T201
+            sys.exit(error.exit_code)
+
+
+app = typer.Typer(
+    name="dmpcli",
+    cls=Group,
+    help="Turn one drag-taught stroke into the same stroke anywhere.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("record")(record.command)
+app.command("fit")(fit.command)
+app.command("generalize")(generalize.command)
+app.command("execute")(execute.command)
+app.command("report")(report.command)
+app.command("inspect")(inspect.command)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"dmpcli {__version__}")  # noqa: T201
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Turn one drag-taught stroke into the same stroke anywhere."""
+
+
+def main() -> None:
+    """Console entry point."""
+    app()

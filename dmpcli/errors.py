@@ -1,0 +1,28 @@
+"""What goes wrong through no fault of the program, and the exit code of each.
+
+A message is one or two lines: what is wrong, where (file, column, row), what to do.
+"""
+
+
+class DmpError(Exception):
+    """Root of every error that a user can cause and mend; never shown as a traceback."""
+
+    exit_code = 2
+
+
+class InputError(DmpError):
+    """The command line, a preset, an input file or a missing extra is wrong (exit code 2)."""
+
+    exit_code = 2
+
+
+class RefusedError(DmpError):
+    """The stroke cannot be drawn here, or the motion or robot state breaks a limit (code 3)."""
+
+    exit_code = 3
+
+
+class InstrumentError(DmpError):
+    """An instrument cannot be reached, or failed while running (exit code 4)."""
+
+    exit_code = 4

@@ -1,0 +1,142 @@
+"""What every sensor and every robot must offer: two small protocols and their values.
+
+A driver converts at the edge: whatever it speaks on the wire, these values are in mm, rad, s, N and
+N·m, rotations as matrices, times on the clock that the loop runs on.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from dmpcli.arrays import Floats
+
+RobotMode = Literal["ready", "stopped", "emergency stop", "protective stop", "fault", "not ready"]
+
+
+@dataclass(frozen=True)
+class SensorInfo:
+    """What a force/torque sensor says of itself.
+
+    Attributes
+    ----------
+    make : str
+    rate : float
+        Samples per second, Hz.
+    limit : array, shape (6,)
+        Measuring range per axis, N and N·m; a reading at the limit is saturated.
+    """
+
+    make: str
+    rate: float
+    limit: Floats
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One reading of the sensor, as sensed.
+
+    Attributes
+    ----------
+    t : float
+        When it arrived, s, on the loop's clock.
+    seq : int
+        The sensor's own sequence number.
+    wrench : array, shape (6,)
+        N and N·m, in the sensor's axes, about its origin, acting on the tool.
+    healthy : bool
+        False when the sensor flags itself, or the reading is saturated.
+    lost : int
+        Samples lost since the start.
+    """
+
+    t: float
+    seq: int
+    wrench: Floats
+    healthy: bool
+    lost: int
+
+
+class Sensor(Protocol):
+    """A six-axis force/torque sensor."""
+
+    def open(self) -> SensorInfo:
+        """Connect; InstrumentError when it cannot be reached."""
+
+    def start(self, rate: float) -> None:
+        """Begin to stream at `rate` Hz."""
+
+    def poll(self) -> list[Sample]:
+        """Return the samples that arrived since the last call, oldest first; never waits."""
+
+    def close(self) -> None:
+        """Stop streaming and disconnect; may be called twice."""
+
+
+@dataclass(frozen=True)
+class ServoInfo:
+    """What a position-servo interface says of itself.
+
+    Attributes
+    ----------
+    make : str
+    period_range : tuple of float
+        Shortest and longest servo period it takes, s.
+    lookahead : float
+        Time between a set-point's arrival and its being reached, s.
+    """
+
+    make: str
+    period_range: tuple[float, float]
+    lookahead: float
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """Where the tool is and whether the arm may move.
+
+    Attributes
+    ----------
+    t : float
+        s, on the loop's clock.
+    position : array, shape (3,)
+        Actual TCP, mm, base frame.
+    rotation : array, shape (3, 3)
+    mode : str
+        Anything but ``ready`` forbids motion.
+    """
+
+    t: float
+    position: Floats
+    rotation: Floats
+    mode: RobotMode
+
+
+class Servo(Protocol):
+    """A robot arm that takes TCP set-points in time."""
+
+    def open(self) -> ServoInfo:
+        """Connect; InstrumentError when it cannot be reached."""
+
+    def state(self) -> RobotState:
+        """Return the actual pose and mode now."""
+
+    def start(self, period: float) -> None:
+        """Enter servo mode with one set-point every `period` s."""
+
+    def send(self, position: Floats, rotation: Floats) -> bool:
+        """Send one set-point; False when the controller did not take it."""
+
+    def stop(self) -> None:
+        """Leave servo mode and stand still at once; may be called twice."""
+
+    def close(self) -> None:
+        """Disconnect; stops first if still moving."""
+
+
+class Clock(Protocol):
+    """Real or simulated time, s, from any origin."""
+
+    def now(self) -> float:
+        """Return the time."""
+
+    def sleep_until(self, t: float) -> None:
+        """Return when `t` has come; at once if it has passed."""

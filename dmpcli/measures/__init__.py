@@ -1,0 +1,1 @@
+"""Wave height, deviation, smoothness and timing of strokes: arrays in, numbers out."""

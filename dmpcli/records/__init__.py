@@ -1,0 +1,1 @@
+"""The Parquet and JSON contracts between the stages, and their provenance."""

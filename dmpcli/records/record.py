@@ -1,0 +1,267 @@
+"""A record: one Parquet file between the stages, its columns as arrays and its provenance."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dmpcli import __version__, rotations
+from dmpcli.arrays import AnyArray, Floats
+from dmpcli.errors import InputError
+from dmpcli.records import schemas
+from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Column, Schema
+from dmpcli.records.streams import Source
+
+_KEY = b"dmpcli"
+_TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a file comes from; the same for the same inputs, options and seed.
+
+    Parameters
+    ----------
+    command : str
+        The subcommand that wrote it.
+    options : dict
+        The options that change the result, defaults included; JSON values.
+    inputs : tuple of dict
+        ``{"role": ..., "sha256": ...}`` of each input, in order.
+    facts : dict
+        What later stages need of this kind of file (k, d, tau, alpha_e, normal, ...); JSON values.
+    """
+
+    command: str
+    options: dict[str, Any] = field(default_factory=dict)
+    inputs: tuple[dict[str, str], ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict)
+    tool: str = __version__
+
+
+def input_of(role: str, source: "Source | Record") -> dict[str, str]:
+    """Return the entry of `Provenance.inputs` for one input."""
+    return {"role": role, "sha256": source.sha256}
+
+
+@dataclass(frozen=True)
+class Record:
+    """One file of a published schema.
+
+    Attributes
+    ----------
+    schema : Schema
+    columns : dict of array, shape (rows,)
+        Missing optional columns are absent; nulls in a number column are NaN.
+    provenance : Provenance
+    name : str
+        What messages call the file.
+    sha256 : str
+        Of the file's bytes; empty for one that was not read from a file.
+    """
+
+    schema: Schema
+    columns: dict[str, AnyArray]
+    provenance: Provenance
+    name: str = ""
+    sha256: str = ""
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def has(self, *names: str) -> bool:
+        """Tell whether all of these columns are there and hold at least one value."""
+        return all(n in self.columns and not _all_null(self.columns[n]) for n in names)
+
+    def stack(self, names: Sequence[str]) -> Floats:
+        """Return several number columns as one array, shape (rows, len(names))."""
+        return np.column_stack([self.columns[n] for n in names]).astype(float)
+
+    @property
+    def t(self) -> Floats:
+        """Time, shape (rows,), s."""
+        return np.asarray(self.columns["t"], dtype=float)
+
+    def position(self, suffix: str = "") -> Floats:
+        """TCP positions, shape (rows, 3), mm; `suffix` picks ``ref``, ``plan`` or ``sent``."""
+        return self.stack(schemas.suffixed(POSITION, suffix) if suffix else POSITION)
+
+    def rotation(self, suffix: str = "") -> Floats | None:
+        """TCP rotations, shape (rows, 3, 3), or None where the file holds no orientation."""
+        names = schemas.suffixed(EULER_ANGLES, suffix) if suffix else EULER_ANGLES
+        return rotations.from_euler(self.stack(names)) if self.has(*names) else None
+
+
+def _all_null(column: AnyArray) -> bool:
+    return bool(column.dtype.kind == "f" and np.all(np.isnan(column)))
+
+
+def encode(record: Record) -> bytes:
+    """Return the record as the bytes of a Parquet file; the same record gives the same bytes."""
+    fields, arrays = [], []
+    for name, column in record.schema.columns.items():
+        if name not in record.columns:
+            if column.required:
+                raise KeyError(f"{record.schema.name} lacks column {name}")
+            continue
+        values = record.columns[name]
+        mask = np.isnan(values) if values.dtype.kind == "f" else None
+        arrays.append(pa.array(values, type=_TYPES[column.type], mask=mask))
+        fields.append(
+            pa.field(
+                name,
+                _TYPES[column.type],
+                metadata={"unit": column.unit, "meaning": column.meaning},
+            )
+        )
+    table = pa.Table.from_arrays(
+        arrays, schema=pa.schema(fields, metadata={_KEY: _header(record)})
+    )
+    floats = [f.name for f in fields if f.type == pa.float64()]
+    others = [f.name for f in fields if f.type != pa.float64()]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table, sink, compression="zstd", use_byte_stream_split=floats, use_dictionary=others
+    )
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def _header(record: Record) -> bytes:
+    p = record.provenance
+    header = {
+        "schema": record.schema.name,
+        "version": record.schema.version,
+        "tool": p.tool,
+        "command": p.command,
+        "options": p.options,
+        "inputs": list(p.inputs),
+        "facts": p.facts,
+        "frame": schemas.FRAME,
+        "euler": schemas.EULER,
+    }
+    return json.dumps(header, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+
+
+def decode(source: Source, expected: Schema | None = None) -> Record:
+    """Read one of our Parquet files.
+
+    Parameters
+    ----------
+    source : Source
+    expected : Schema, optional
+        The only schema that will do; without it any of ours will.
+
+    Raises
+    ------
+    InputError
+        Not a Parquet file, truncated, not one of ours, of another schema, of a newer version, a
+        required column missing or of the wrong type, or a value that is not finite.
+    """
+    table = parquet_table(source)
+    header = header_of(table, source.name)
+    schema = SCHEMAS.get(str(header.get("schema")))
+    if schema is None:
+        raise InputError(f"{source.name}: unknown schema {header.get('schema')!r}")
+    if expected is not None and schema is not expected:
+        raise InputError(
+            f"{source.name}: is a {schema.name} file, a {expected.name} file is needed here"
+        )
+    version = header.get("version", 0)
+    if version > schema.version:
+        raise InputError(
+            f"{source.name}: {schema.name} version {version} is newer than this program's "
+            f"({schema.version}); upgrade dmpcli"
+        )
+    return Record(
+        schema,
+        columns_of(table, schema.columns, source.name),
+        Provenance(
+            str(header.get("command", "")),
+            dict(header.get("options", {})),
+            tuple(header.get("inputs", ())),
+            dict(header.get("facts", {})),
+            str(header.get("tool", "")),
+        ),
+        source.name,
+        source.sha256,
+    )
+
+
+def parquet_table(source: Source) -> Any:
+    """Return the pyarrow table of a Parquet source, ours or another's."""
+    try:
+        return pq.read_table(source.open())
+    except (pa.ArrowException, OSError, ValueError):
+        raise InputError(
+            f"{source.name}: is not a Parquet file, or it is truncated or damaged; make it again"
+        ) from None
+
+
+def header_of(table: Any, name: str) -> dict[str, Any]:
+    """Return our metadata of a pyarrow table; InputError where there is none or it is broken."""
+    metadata = table.schema.metadata or {}
+    if _KEY not in metadata:
+        raise InputError(f"{name}: a Parquet file, but not written by dmpcli; see dmpcli fit --help")
+    try:
+        header = json.loads(metadata[_KEY])
+    except ValueError:
+        header = None
+    if not isinstance(header, dict) or not isinstance(header.get("version", 0), int):
+        raise InputError(f"{name}: its dmpcli metadata are damaged; make the file again")
+    return header
+
+
+def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:
+    """Return the wanted columns of a pyarrow table as arrays, checked.
+
+    Raises
+    ------
+    InputError
+        A required column is missing, empty or null somewhere, or a value is not a finite number.
+    """
+    columns: dict[str, AnyArray] = {}
+    for key, column in wanted.items():
+        if key not in table.column_names:
+            if column.required:
+                raise InputError(
+                    f"{name}: column {key!r} is missing; it has {', '.join(table.column_names)}"
+                )
+            continue
+        columns[key] = _array(table.column(key), key, column, name)
+    if table.num_rows == 0:
+        raise InputError(f"{name}: holds no rows")
+    return columns
+
+
+def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
+    try:
+        values = chunked.cast(_TYPES[column.type])
+    except pa.ArrowException:
+        raise InputError(
+            f"{name}: column {key!r} holds {chunked.type}, numbers are needed"
+            if column.type != "string"
+            else f"{name}: column {key!r} holds {chunked.type}, text is needed"
+        ) from None
+    nulls = values.is_null().to_numpy()
+    if column.required and nulls.any():
+        raise InputError(
+            f"{name}: column {key!r}, row {int(np.argmax(nulls)) + 1}: no value; "
+            "remove the row or fill it in"
+        )
+    if column.type == "string":
+        return np.asarray(values.to_pylist(), dtype=object)
+    if column.type == "int64":
+        return np.asarray(values.fill_null(-1).to_numpy(), dtype=np.int64)
+    array: AnyArray = np.asarray(values.to_numpy(), dtype=float)
+    bad = ~np.isfinite(array) & ~nulls
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(
+            f"{name}: column {key!r}, row {row + 1}: {array[row]} is not a finite number; "
+            "remove the row or mend it"
+        )
+    return array

@@ -1,0 +1,131 @@
+"""What each Parquet file between the stages holds: columns, units, version.
+
+Lengths in mm, angles in rad, time in s, force in N, torque in N·m, all in the robot's base frame.
+"""
+
+from dataclasses import dataclass, field
+
+FRAME = "robot base"
+EULER = "X-Y-Z intrinsic, R = Rx(rx) Ry(ry) Rz(rz)"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a file: its unit, what it means, and whether a reader demands it."""
+
+    unit: str
+    meaning: str
+    type: str = "double"
+    required: bool = True
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The name, version and columns of one kind of file."""
+
+    name: str
+    version: int
+    meaning: str
+    columns: dict[str, Column] = field(default_factory=dict)
+
+
+POSITION = ("x", "y", "z")
+EULER_ANGLES = ("rx", "ry", "rz")
+POSE = POSITION + EULER_ANGLES
+FORCE = ("fx", "fy", "fz")
+TORQUE = ("tx", "ty", "tz")
+WRENCH = FORCE + TORQUE
+NORMAL = ("nx", "ny", "nz")
+
+
+def suffixed(names: tuple[str, ...], suffix: str) -> tuple[str, ...]:
+    """Column names with a suffix: ``x`` → ``x_ref``."""
+    return tuple(f"{name}_{suffix}" for name in names)
+
+
+def _pose(meaning: str, suffix: str = "", required: bool = True) -> dict[str, Column]:
+    tail = f"_{suffix}" if suffix else ""
+    columns = {n + tail: Column("mm", f"{meaning}, position", required=required) for n in POSITION}
+    return columns | {
+        n + tail: Column("rad", f"{meaning}, Euler angle", required=False) for n in EULER_ANGLES
+    }
+
+
+def _wrench(meaning: str, suffix: str = "") -> dict[str, Column]:
+    tail = f"_{suffix}" if suffix else ""
+    columns = {n + tail: Column("N", f"{meaning}, force", required=False) for n in FORCE}
+    return columns | {n + tail: Column("N·m", f"{meaning}, torque", required=False) for n in TORQUE}
+
+
+DEMONSTRATION = Schema(
+    "demonstration",
+    1,
+    "what the tool did while it was dragged, one row per control cycle",
+    {"t": Column("s", "time since the recording began")}
+    | _pose("actual TCP")
+    | _pose("admittance reference", "ref", required=False)
+    | _wrench("compensated wrench on the tool, at the TCP, base axes")
+    | _wrench("wrench as sensed, sensor axes", "raw")
+    | {
+        "sensor_seq": Column("1", "sequence number of the sensor sample", "int64", required=False),
+        "lost": Column("1", "sensor samples lost so far", "int64", required=False),
+    },
+)
+
+TRAJECTORY = Schema(
+    "trajectory",
+    1,
+    "where the tool shall go",
+    {
+        "id": Column("1", "the start-goal pair", "string"),
+        "t": Column("s", "time since the stroke began"),
+    }
+    | _pose("planned TCP")
+    | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL},
+)
+
+RUN = Schema(
+    "run",
+    1,
+    "what was sent and what the arm did, one row per servo cycle",
+    {
+        "t": Column("s", "time since the first set-point"),
+        "t_plan": Column("s", "time along the planned trajectory"),
+    }
+    | _pose("planned TCP", "plan")
+    | _pose("sent set-point", "sent")
+    | _pose("actual TCP")
+    | {
+        "deadline": Column("s", "when the set-point was due"),
+        "lateness": Column("s", "how much later it was sent"),
+    }
+    | _wrench("compensated wrench on the tool, at the TCP, base axes")
+    | {
+        "coupling": Column("mm", "e of eq. (10), along the normal", required=False),
+        "state": Column("1", "robot state", "string"),
+        "phase": Column("1", "approach, stroke or stop", "string"),
+    },
+)
+
+PAIRS = Schema(
+    "pairs",
+    1,
+    "the start-goal pairs of a batch and what became of each",
+    {"id": Column("1", "the start-goal pair", "string")}
+    | {f"{n}{end}": Column("mm", "start" if end == "0" else "goal") for end in "0g" for n in "xyz"}
+    | {
+        f"r{n}{end}": Column("rad", "start" if end == "0" else "goal", required=False)
+        for end in "0g"
+        for n in "xyz"
+    }
+    | {
+        "duration": Column("s", "of the stroke"),
+        "nx": Column("1", "unit normal of the pair's plane", required=False),
+        "ny": Column("1", "unit normal of the pair's plane", required=False),
+        "nz": Column("1", "unit normal of the pair's plane", required=False),
+        "part": Column("1", "file that holds the trajectory", "string", required=False),
+        "status": Column("1", "ok, or why there is no trajectory", "string"),
+    },
+)
+
+SCHEMAS = {s.name: s for s in (DEMONSTRATION, TRAJECTORY, RUN, PAIRS)}

@@ -1,0 +1,133 @@
+"""Settings of a command: options beat ``--config``, which beats the preset, which beats defaults.
+
+A preset is one TOML file with a section per command (``[record]``, ``[fit]``, ...) and a
+``[units]`` section that states the units its author had in mind; units other than the program's
+are refused by name. Presets that come with the program are addressed by name.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from dmpcli.errors import InputError
+
+UNITS = {"length": "mm", "angle": "rad", "time": "s", "force": "N", "torque": "N·m"}
+
+
+class Settings(BaseModel):
+    """Base of every command's settings: unknown keys, NaN and infinity are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+S = TypeVar("S", bound=BaseModel)
+
+
+def resolve(
+    kind: type[S],
+    section: str,
+    options: Mapping[str, Any],
+    preset: str | None = None,
+    config: Path | None = None,
+) -> S:
+    """Merge preset, configuration file and command-line options, and check the result.
+
+    Parameters
+    ----------
+    kind : type
+        The settings model; its defaults hold where nothing else is said.
+    section : str
+        The TOML section, which is the command's name.
+    options : mapping
+        Command-line options by field name; None means not given.
+    preset : str, optional
+        Name of a preset of ours, or a path that ends in ``.toml``.
+    config : Path, optional
+        A TOML file of the same form.
+
+    Raises
+    ------
+    InputError
+        A file is missing or is not TOML, states other units, lacks the section, names an unknown
+        key, or a value is of the wrong type, out of range, NaN or infinite.
+    """
+    merged: dict[str, Any] = {}
+    origin: dict[str, str] = {}
+    for label, values in (
+        *([_preset(preset, section)] if preset else []),
+        *([_toml_section(str(config), _read(config), section)] if config else []),
+    ):
+        merged |= values
+        origin |= dict.fromkeys(values, label)
+    given = {key: value for key, value in options.items() if value is not None}
+    merged |= given
+    origin |= {key: "command line" for key in given}
+    try:
+        return kind.model_validate(merged)
+    except ValidationError as error:
+        raise InputError(_first(error, section, origin)) from None
+
+
+def preset_names() -> list[str]:
+    """Names of the presets that come with the program."""
+    folder = resources.files("dmpcli") / "presets"
+    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+
+
+def _preset(name: str, section: str) -> tuple[str, dict[str, Any]]:
+    if name.endswith(".toml"):
+        return _toml_section(name, _read(Path(name)), section)
+    if name not in preset_names():
+        raise InputError(
+            f"--preset {name}: no such preset; there are {', '.join(preset_names())}, "
+            "or give a file that ends in .toml"
+        )
+    text = (resources.files("dmpcli") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return _toml_section(f"preset {name}", text, section)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the name") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text: {error}") from None
+
+
+def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, Any]]:
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{label}: is not TOML: {error}") from None
+    for quantity, unit in document.get("units", {}).items():
+        if UNITS.get(quantity) != unit:
+            raise InputError(
+                f"{label}: [units] {quantity} = {unit!r}: this program's are "
+                + ", ".join(f"{q} in {u}" for q, u in UNITS.items())
+            )
+    if section not in document:
+        raise InputError(
+            f"{label}: has no [{section}] section; it has "
+            + ", ".join(f"[{name}]" for name in document)
+        )
+    return label, dict(document[section])
+
+
+def _first(error: ValidationError, section: str, origin: Mapping[str, str]) -> str:
+    """One line for the first thing wrong, naming where it was said."""
+    detail = error.errors()[0]
+    keys = [str(part) for part in detail["loc"]]
+    where = origin.get(keys[0], "defaults") if keys else "defaults"
+    name = ".".join(keys) or section
+    shown = f"--{name.replace('_', '-')}" if where == "command line" else f"[{section}] {name}"
+    given = "" if detail["type"] in ("missing", "extra_forbidden") else f" = {detail['input']!r}"
+    prefix = "" if where == "command line" else f"{where}: "
+    if detail["type"] == "extra_forbidden":
+        return f"{prefix}{shown}: no such setting"
+    message = detail["msg"].removeprefix("Value error, ")
+    return f"{prefix}{shown}{given}: {message[0].lower()}{message[1:]}"

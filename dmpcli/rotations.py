@@ -1,0 +1,260 @@
+"""Rotations as matrices; Euler angles only where files and drivers need them.
+
+Euler angles are X-Y-Z, intrinsic, in rad: ``R = Rx(rx) Ry(ry) Rz(rz)``. Every function works on
+stacks: the rotation's own axes are the last ones, any number of axes may stand before them.
+"""
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+
+# Below this the series of sin(x)/x to second order is exact to rounding.
+_SMALL_ANGLE = 1e-4
+
+
+def from_euler(angles: Floats) -> Floats:
+    """Rotation matrices of X-Y-Z intrinsic Euler angles.
+
+    Parameters
+    ----------
+    angles : array, shape (..., 3)
+        rx, ry, rz in rad.
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+        ``Rx(rx) Ry(ry) Rz(rz)``.
+    """
+    a = np.asarray(angles, dtype=float)
+    cx, cy, cz = np.moveaxis(np.cos(a), -1, 0)
+    sx, sy, sz = np.moveaxis(np.sin(a), -1, 0)
+    R = np.empty((*a.shape[:-1], 3, 3))
+    R[..., 0, 0] = cy * cz
+    R[..., 0, 1] = -cy * sz
+    R[..., 0, 2] = sy
+    R[..., 1, 0] = cx * sz + sx * sy * cz
+    R[..., 1, 1] = cx * cz - sx * sy * sz
+    R[..., 1, 2] = -sx * cy
+    R[..., 2, 0] = sx * sz - cx * sy * cz
+    R[..., 2, 1] = sx * cz + cx * sy * sz
+    R[..., 2, 2] = cx * cy
+    return R
+
+
+def to_euler(R: Floats) -> Floats:
+    """X-Y-Z intrinsic Euler angles of rotation matrices, each on its own.
+
+    At the singularity (ry = ±π/2), where only rx ± rz is defined, rz is 0.
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+
+    Returns
+    -------
+    array, shape (..., 3)
+        rx, rz in (-π, π], ry in [-π/2, π/2], rad. A pen that points straight down reads
+        rx = +π whatever the sign of the rounding error.
+    """
+    cy = np.hypot(R[..., 0, 0], R[..., 0, 1])
+    ry = np.arctan2(R[..., 0, 2], cy)
+    regular = cy > 1e-9
+    rx = np.where(
+        regular,
+        np.arctan2(-R[..., 1, 2], R[..., 2, 2]),
+        np.arctan2(R[..., 2, 1], R[..., 1, 1]),
+    )
+    rz = np.where(regular, np.arctan2(-R[..., 0, 1], R[..., 0, 0]), 0.0)
+    angles = np.stack([rx, ry, rz], axis=-1)
+    angles[angles < -np.pi + 1e-9] += 2 * np.pi
+    return angles
+
+
+def to_euler_continuous(R: Floats) -> Floats:
+    """Euler angles along a path, unwrapped: no jump where the rotation has none.
+
+    Each rotation has two sets of X-Y-Z angles, (rx, ry, rz) and (rx + π, π - ry, rz + π), both up
+    to full turns. The set and the turns nearest to the previous sample are taken, so that a path
+    through ry = ±π/2 or past rx = ±π stays continuous.
+
+    Parameters
+    ----------
+    R : array, shape (..., T, 3, 3)
+        Rotations along the path, on axis -3.
+
+    Returns
+    -------
+    array, shape (..., T, 3)
+        rad; the first sample is that of `to_euler`.
+    """
+    first = to_euler(R)
+    second = np.stack(
+        [first[..., 0] + np.pi, np.pi - first[..., 1], first[..., 2] + np.pi], axis=-1
+    )
+    if first.shape[-2] > 1:
+        stay = np.abs(_wrapped(np.diff(first, axis=-2))).sum(axis=-1)
+        change = np.abs(_wrapped(second[..., 1:, :] - first[..., :-1, :])).sum(axis=-1)
+        swapped = np.zeros(first.shape[:-1], dtype=bool)
+        swapped[..., 1:] = np.cumsum(change < stay, axis=-1) % 2 == 1
+        first = np.where(swapped[..., None], second, first)
+    return np.unwrap(first, axis=-2)
+
+
+def _wrapped(angles: Floats) -> Floats:
+    return (angles + np.pi) % (2 * np.pi) - np.pi
+
+
+def exp(rotvec: Floats) -> Floats:
+    """Rotation matrices of rotation vectors (Rodrigues' formula).
+
+    Parameters
+    ----------
+    rotvec : array, shape (..., 3)
+        Axis times angle, rad.
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+    """
+    v = np.asarray(rotvec, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)
+    small = angle < _SMALL_ANGLE
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
+    b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    K = skew(v)
+    return np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+
+
+def log(R: Floats) -> Floats:
+    """Rotation vectors of rotation matrices; accurate at all angles, π included.
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+
+    Returns
+    -------
+    array, shape (..., 3)
+        Axis times angle, rad, angle in [0, π].
+    """
+    q = to_quaternion(R)
+    vector, scalar = q[..., :3], q[..., 3]
+    sine = np.linalg.norm(vector, axis=-1)
+    small = sine < _SMALL_ANGLE
+    half = np.arctan2(sine, scalar)
+    factor = np.where(small, 2.0 + sine**2 / 3.0, 2.0 * half / np.where(small, 1.0, sine))
+    return factor[..., None] * vector
+
+
+def to_quaternion(R: Floats) -> Floats:
+    """Unit quaternions (x, y, z, w) of rotation matrices, w ≥ 0 (Shepperd's method).
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+
+    Returns
+    -------
+    array, shape (..., 4)
+    """
+    R = np.asarray(R, dtype=float)
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    d = np.diagonal(R, axis1=-2, axis2=-1)
+    # Four times the squared components; the largest of them is the divisor that loses nothing.
+    squares = np.concatenate([1.0 + 2.0 * d - trace[..., None], (1.0 + trace)[..., None]], axis=-1)
+    x, y, z = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1])
+    xy, xz, yz = (
+        R[..., 0, 1] + R[..., 1, 0],
+        R[..., 0, 2] + R[..., 2, 0],
+        R[..., 1, 2] + R[..., 2, 1],
+    )
+    candidates = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, x], axis=-1),
+            np.stack([xy, squares[..., 1], yz, y], axis=-1),
+            np.stack([xz, yz, squares[..., 2], z], axis=-1),
+            np.stack([x, y, z, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(squares, axis=-1)
+    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., 3:] < 0, -q, q)
+
+
+def from_quaternion(q: Floats) -> Floats:
+    """Rotation matrices of unit quaternions (x, y, z, w); the norm is divided out.
+
+    Parameters
+    ----------
+    q : array, shape (..., 4)
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+    """
+    q = np.asarray(q, dtype=float)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    K = skew(q[..., :3])
+    return np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)
+
+
+def skew(v: Floats) -> Floats:
+    """Matrices of the cross product: ``skew(v) @ x = v × x``.
+
+    Parameters
+    ----------
+    v : array, shape (..., 3)
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+    """
+    v = np.asarray(v, dtype=float)
+    K = np.zeros((*v.shape[:-1], 3, 3))
+    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return K
+
+
+def interpolate(t: Floats, R: Floats, at: Floats) -> Floats:
+    """Rotations between samples, along the shortest arc at constant angular velocity (slerp).
+
+    Parameters
+    ----------
+    t : array, shape (T,)
+        Increasing times, s.
+    R : array, shape (T, 3, 3)
+    at : array, shape (S,)
+        Times to read, s; outside [t[0], t[-1]] the end rotations hold.
+
+    Returns
+    -------
+    array, shape (S, 3, 3)
+    """
+    if len(t) == 1:
+        return np.broadcast_to(R[0], (len(at), 3, 3)).copy()
+    i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    fraction = np.clip((at - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
+    step = log(R[i + 1] @ np.swapaxes(R[i], -1, -2))
+    return exp(fraction[:, None] * step) @ R[i]
+
+
+def smallest_between(a: Floats, b: Floats) -> Floats:
+    """Smallest rotation that turns unit vectors `a` onto unit vectors `b`.
+
+    Parameters
+    ----------
+    a, b : array, shape (..., 3)
+        Unit vectors, not opposite to each other.
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+    """
+    a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+    K = skew(np.cross(a, b))
+    cosine = np.sum(a * b, axis=-1)[..., None, None]
+    return np.eye(3) + K + (K @ K) / (1.0 + cosine)

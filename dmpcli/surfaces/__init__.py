@@ -1,0 +1,1 @@
+"""Surfaces and the charts that carry a stroke onto them."""
