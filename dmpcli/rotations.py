@@ -4,6 +4,8 @@ Euler angles are X-Y-Z, intrinsic, in rad: ``R = Rx(rx) Ry(ry) Rz(rz)``. Every f
 stacks: the rotation's own axes are the last ones, any number of axes may stand before them.
 """
 
+import math
+
 import numpy as np
 
 from dmpcli.arrays import Floats
@@ -123,7 +125,8 @@ def exp(rotvec: Floats) -> Floats:
     a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
     b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
     K = skew(v)
-    return np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+    R: Floats = np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+    return R
 
 
 def log(R: Floats) -> Floats:
@@ -144,7 +147,61 @@ def log(R: Floats) -> Floats:
     small = sine < _SMALL_ANGLE
     half = np.arctan2(sine, scalar)
     factor = np.where(small, 2.0 + sine**2 / 3.0, 2.0 * half / np.where(small, 1.0, sine))
-    return factor[..., None] * vector
+    rotvec: Floats = factor[..., None] * vector
+    return rotvec
+
+
+def exp_one(rotvec: Floats) -> Floats:
+    """`exp` of a single rotation vector, in plain floats: several times faster, for control loops.
+
+    Parameters
+    ----------
+    rotvec : array, shape (3,)
+        rad.
+
+    Returns
+    -------
+    array, shape (3, 3)
+    """
+    x, y, z = rotvec.tolist()
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < _SMALL_ANGLE:
+        a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
+    else:
+        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    bx, by, bz = b * x, b * y, b * z
+    ax, ay, az = a * x, a * y, a * z
+    return np.array(
+        [
+            [1.0 - by * y - bz * z, bx * y - az, bx * z + ay],
+            [bx * y + az, 1.0 - bx * x - bz * z, by * z - ax],
+            [bx * z - ay, by * z + ax, 1.0 - bx * x - by * y],
+        ]
+    )
+
+
+def log_one(R: Floats) -> Floats:
+    """`log` of a single rotation matrix: several times faster away from a half turn.
+
+    Parameters
+    ----------
+    R : array, shape (3, 3)
+
+    Returns
+    -------
+    array, shape (3,)
+        rad, angle in [0, π].
+    """
+    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
+    scalar = 1.0 + a + e + i
+    if scalar < 1.0:  # beyond 120°, where the vector part must be found with more care
+        return log(R)
+    # The quaternion times 4w, whose scalar part is 4w² = scalar.
+    x, y, z = h - f, c - g, d - b
+    sine = math.sqrt(x * x + y * y + z * z)
+    factor = 2.0 * math.atan2(sine, scalar) / sine if sine > 0.0 else 0.5
+    return np.array([factor * x, factor * y, factor * z])
 
 
 def to_quaternion(R: Floats) -> Floats:
@@ -163,12 +220,9 @@ def to_quaternion(R: Floats) -> Floats:
     d = np.diagonal(R, axis1=-2, axis2=-1)
     # Four times the squared components; the largest of them is the divisor that loses nothing.
     squares = np.concatenate([1.0 + 2.0 * d - trace[..., None], (1.0 + trace)[..., None]], axis=-1)
-    x, y, z = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1])
-    xy, xz, yz = (
-        R[..., 0, 1] + R[..., 1, 0],
-        R[..., 0, 2] + R[..., 2, 0],
-        R[..., 1, 2] + R[..., 2, 1],
-    )
+    odd, even = R - np.swapaxes(R, -1, -2), R + np.swapaxes(R, -1, -2)
+    x, y, z = odd[..., 2, 1], odd[..., 0, 2], odd[..., 1, 0]
+    xy, xz, yz = even[..., 0, 1], even[..., 0, 2], even[..., 1, 2]
     candidates = np.stack(
         [
             np.stack([squares[..., 0], xy, xz, x], axis=-1),
@@ -179,9 +233,10 @@ def to_quaternion(R: Floats) -> Floats:
         axis=-2,
     )
     best = np.argmax(squares, axis=-1)
-    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
+    q: Floats = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(q[..., 3:] < 0, -q, q)
+    q *= np.where(q[..., 3:] < 0, -1.0, 1.0)
+    return q
 
 
 def from_quaternion(q: Floats) -> Floats:
@@ -198,7 +253,8 @@ def from_quaternion(q: Floats) -> Floats:
     q = np.asarray(q, dtype=float)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     K = skew(q[..., :3])
-    return np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)
+    R: Floats = np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)
+    return R
 
 
 def skew(v: Floats) -> Floats:
@@ -257,4 +313,5 @@ def smallest_between(a: Floats, b: Floats) -> Floats:
     a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
     K = skew(np.cross(a, b))
     cosine = np.sum(a * b, axis=-1)[..., None, None]
-    return np.eye(3) + K + (K @ K) / (1.0 + cosine)
+    R: Floats = np.eye(3) + K + (K @ K) / (1.0 + cosine)
+    return R

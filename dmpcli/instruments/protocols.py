@@ -5,7 +5,7 @@ N·m, rotations as matrices, times on the clock that the loop runs on.
 """
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
 
@@ -130,6 +130,14 @@ class Servo(Protocol):
 
     def close(self) -> None:
         """Disconnect; stops first if still moving."""
+
+
+@runtime_checkable
+class DragTeaching(Protocol):
+    """What a robot with a drag teaching of its own offers besides `Servo`."""
+
+    def drag(self) -> None:
+        """Hand the arm over to its own drag teaching, until `Servo.stop`."""
 
 
 class Clock(Protocol):

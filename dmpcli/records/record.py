@@ -118,9 +118,7 @@ def encode(record: Record) -> bytes:
                 metadata={"unit": column.unit, "meaning": column.meaning},
             )
         )
-    table = pa.Table.from_arrays(
-        arrays, schema=pa.schema(fields, metadata={_KEY: _header(record)})
-    )
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={_KEY: _header(record)}))
     floats = [f.name for f in fields if f.type == pa.float64()]
     others = [f.name for f in fields if f.type != pa.float64()]
     sink = pa.BufferOutputStream()
@@ -194,18 +192,34 @@ def decode(source: Source, expected: Schema | None = None) -> Record:
 def parquet_table(source: Source) -> Any:
     """Return the pyarrow table of a Parquet source, ours or another's."""
     try:
-        return pq.read_table(source.open())
+        return pq.ParquetFile(source.open()).read()
     except (pa.ArrowException, OSError, ValueError):
         raise InputError(
             f"{source.name}: is not a Parquet file, or it is truncated or damaged; make it again"
         ) from None
 
 
+def is_ours(source: Source) -> bool:
+    """Tell whether a source is a Parquet file that carries our metadata.
+
+    A damaged Parquet file counts as ours, so that `decode` says what is wrong with it.
+    """
+    if source.content[:4] != b"PAR1":
+        return False
+    try:
+        metadata = pq.read_schema(source.open()).metadata or {}
+    except (pa.ArrowException, OSError, ValueError):
+        return True
+    return _KEY in metadata
+
+
 def header_of(table: Any, name: str) -> dict[str, Any]:
     """Return our metadata of a pyarrow table; InputError where there is none or it is broken."""
     metadata = table.schema.metadata or {}
     if _KEY not in metadata:
-        raise InputError(f"{name}: a Parquet file, but not written by dmpcli; see dmpcli fit --help")
+        raise InputError(
+            f"{name}: a Parquet file, but not written by dmpcli; fit can read it, see fit --help"
+        )
     try:
         header = json.loads(metadata[_KEY])
     except ValueError:

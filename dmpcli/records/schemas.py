@@ -112,14 +112,18 @@ PAIRS = Schema(
     1,
     "the start-goal pairs of a batch and what became of each",
     {"id": Column("1", "the start-goal pair", "string")}
-    | {f"{n}{end}": Column("mm", "start" if end == "0" else "goal") for end in "0g" for n in "xyz"}
+    | {
+        f"{n}{end}": Column("mm", "start" if end == "0" else "goal", required=False)
+        for end in "0g"
+        for n in "xyz"
+    }
     | {
         f"r{n}{end}": Column("rad", "start" if end == "0" else "goal", required=False)
         for end in "0g"
         for n in "xyz"
     }
     | {
-        "duration": Column("s", "of the stroke"),
+        "duration": Column("s", "of the trajectory", required=False),
         "nx": Column("1", "unit normal of the pair's plane", required=False),
         "ny": Column("1", "unit normal of the pair's plane", required=False),
         "nz": Column("1", "unit normal of the pair's plane", required=False),

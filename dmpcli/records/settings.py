@@ -65,7 +65,7 @@ def resolve(
         origin |= dict.fromkeys(values, label)
     given = {key: value for key, value in options.items() if value is not None}
     merged |= given
-    origin |= {key: "command line" for key in given}
+    origin |= dict.fromkeys(given, "command line")
     try:
         return kind.model_validate(merged)
     except ValidationError as error:
@@ -74,8 +74,8 @@ def resolve(
 
 def preset_names() -> list[str]:
     """Names of the presets that come with the program."""
-    folder = resources.files("dmpcli") / "presets"
-    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+    names = [file.name for file in (resources.files("dmpcli") / "presets").iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def _preset(name: str, section: str) -> tuple[str, dict[str, Any]]:
@@ -104,7 +104,8 @@ def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, A
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{label}: is not TOML: {error}") from None
-    for quantity, unit in document.get("units", {}).items():
+    units = document.get("units", {})
+    for quantity, unit in units.items() if isinstance(units, dict) else [("units", units)]:
         if UNITS.get(quantity) != unit:
             raise InputError(
                 f"{label}: [units] {quantity} = {unit!r}: this program's are "
@@ -115,6 +116,8 @@ def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, A
             f"{label}: has no [{section}] section; it has "
             + ", ".join(f"[{name}]" for name in document)
         )
+    if not isinstance(document[section], dict):
+        raise InputError(f"{label}: {section} is not a section; write [{section}]")
     return label, dict(document[section])
 
 

@@ -107,3 +107,41 @@ def write(path: str | Path, content: bytes) -> None:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+PART = "part-*.parquet"
+
+
+def check_folder(path: str | Path) -> None:
+    """Refuse a dataset folder that could not be written, before any work is done.
+
+    Raises
+    ------
+    InputError
+        The name is a file's or ``-``, its parent is missing, or it holds files that are not ours.
+    """
+    folder = Path(path)
+    if str(path) == DASH:
+        raise InputError("-o -: many trajectories need a folder, not standard output")
+    if folder.is_file():
+        raise InputError(f"{path}: is a file; many trajectories need a folder")
+    place = folder if folder.is_dir() else folder.absolute().parent
+    if not place.is_dir():
+        raise InputError(f"{path}: the folder {folder.parent} does not exist; make it first")
+    if not os.access(place, os.W_OK):
+        raise InputError(f"{path}: the folder {place} is not writable")
+
+
+def begin_folder(path: str | Path) -> None:
+    """Make a dataset folder, and remove the parts and the table of an older one.
+
+    The table of pairs goes first: a folder without it is one that is not finished.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(exist_ok=True)
+        (folder / "pairs.parquet").unlink(missing_ok=True)
+        for part in sorted(folder.glob(PART)):
+            part.unlink()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None

@@ -1,0 +1,120 @@
+# dmpcli: set-up, tests, the demonstration and the paper's experiments.
+#
+#   make demo        one drag-taught stroke: record, fit, generalize, execute, report
+#   make reproduce   the paper's flat experiments, target by target
+#   make test        tests, lint, types and import rules
+#   make bench       the timings that the README quotes
+#
+# Each sets up what it needs in .venv first.
+
+PYTHON ?= python3
+BIN    := .venv/bin
+DMPCLI := $(BIN)/dmpcli
+OUT    := out
+
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.PHONY: help demo reproduce test lint bench samples schemas clean
+
+help:
+	@sed -n 's/^#   //p' Makefile
+
+# The environment, from pinned versions.
+
+.venv/installed: requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@
+
+# Tests.
+
+test: .venv/installed lint
+	$(BIN)/pytest --numprocesses auto --dist worksteal
+
+lint: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: .venv/installed
+	$(BIN)/python benchmarks/fit.py
+	$(BIN)/python benchmarks/accuracy.py
+	$(BIN)/python benchmarks/human_strokes.py
+
+# One stroke through the whole tool-chain, against the mock lab.
+
+DEMO := $(OUT)/demo
+
+demo: .venv/installed
+	@mkdir -p $(DEMO)
+	$(DMPCLI) record -o $(DEMO)/demonstration.parquet --seed 1
+	$(DMPCLI) fit $(DEMO)/demonstration.parquet -o $(DEMO)/skill.json
+	$(DMPCLI) generalize $(DEMO)/skill.json -o $(DEMO)/trajectory.parquet \
+	    --start -701.698 132.420 -17.538 --goal -807.597 129.739 -17.518 --ease-in 0.5 --ease-out 0.5
+	$(DMPCLI) execute $(DEMO)/trajectory.parquet -o $(DEMO)/run.parquet
+	$(DMPCLI) report $(DEMO)/demonstration.parquet $(DEMO)/trajectory.parquet $(DEMO)/run.parquet \
+	    -o $(DEMO)/report
+	@$(MAKE) --no-print-directory reproduce
+	@echo "Figures: $(DEMO)/report and $(OUT)/reproduce/*/report"
+
+# The paper's flat experiments (section 3.2.1): Tables 1 and 2, Figures 5 to 8; and the drag
+# comparison of Figures 3 and 4. Twice: from the noise-free reference stroke, and from a stroke
+# recorded with the mock lab.
+
+STROKES    := reference recorded
+SKILLS     := modified modified-ridge modified-paper original-axis original-distance
+PAIR_1     := --start -551.030 131.399 -17.560 --goal -660.021 130.034 -17.538
+PAIR_2     := --start -701.698 132.420 -17.538 --goal -807.597 129.739 -17.518
+FIT_modified          :=
+FIT_modified-ridge    := --regression ridge
+FIT_modified-paper    := --preset paper
+FIT_original-axis     := --preset paper --model original --forcing-scale axis
+FIT_original-distance := --preset paper --model original --forcing-scale distance
+R          := $(OUT)/reproduce
+REPORTS    := $(STROKES:%=$(R)/%/report/report.json)
+
+reproduce: $(REPORTS) $(R)/drag/report/report.json
+	@for stroke in $(STROKES); do \
+	    printf '\n== Tables 1 and 2 from the %s stroke ==\n' $$stroke; \
+	    cat $(R)/$$stroke/tables.txt; \
+	done
+	@printf '\n== Admittance drag and built-in drag (Figures 3 and 4) ==\n'
+	@cat $(R)/drag/tables.txt
+
+define FIT_RULES
+$(R)/$(1)/$(2).json: sample_runs/$(1).parquet | .venv/installed
+	@mkdir -p $$(@D)
+	$(DMPCLI) fit $$< -o $$@ $(FIT_$(2))
+$(R)/$(1)/$(2)-table1.parquet: $(R)/$(1)/$(2).json
+	$(DMPCLI) generalize $$< -o $$@ $(PAIR_1)
+$(R)/$(1)/$(2)-table2.parquet: $(R)/$(1)/$(2).json
+	$(DMPCLI) generalize $$< -o $$@ $(PAIR_2)
+endef
+$(foreach stroke,$(STROKES),$(foreach skill,$(SKILLS),$(eval $(call FIT_RULES,$(stroke),$(skill)))))
+
+define REPORT_RULE
+$(R)/$(1)/report/report.json: sample_runs/$(1).parquet \
+    $(foreach t,1 2,$(SKILLS:%=$(R)/$(1)/%-table$(t).parquet))
+	$(DMPCLI) report $$^ -o $$(@D) > $(R)/$(1)/tables.txt
+endef
+$(foreach stroke,$(STROKES),$(eval $(call REPORT_RULE,$(stroke))))
+
+$(R)/drag/builtin.parquet: sample_runs/recorded.toml | .venv/installed
+	@mkdir -p $(@D)
+	$(DMPCLI) record -o $@ --config $< --drag builtin --seed 1
+$(R)/drag/report/report.json: sample_runs/recorded.parquet $(R)/drag/builtin.parquet
+	$(DMPCLI) report $^ -o $(@D) > $(R)/drag/tables.txt
+
+# The sample runs are kept in the repository; this makes them again, byte for byte.
+
+samples: .venv/installed
+	$(BIN)/python sample_runs/make_reference.py sample_runs/reference.parquet
+	$(DMPCLI) record -o sample_runs/recorded.parquet --config sample_runs/recorded.toml --seed 1
+
+schemas: .venv/installed
+	$(BIN)/python -m dmpcli.records.publish
+
+clean:
+	rm -rf $(OUT)

@@ -1,0 +1,177 @@
+"""``dmpcli fit``: demonstrations in, a skill out."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dmpcli.errors import InputError
+
+if TYPE_CHECKING:
+    from dmpcli.primitives.learning import Fit
+    from dmpcli.records.recordings import Layout
+
+
+def command(
+    demonstrations: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Recordings: ours, or any CSV or Parquet with t, x, y, z; - is standard input.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Skill file (JSON).", show_default=False)
+    ],
+    model: Annotated[
+        str | None, typer.Option(help="modified (eq. 9-11) or original (eq. 4-8).")
+    ] = None,
+    forcing_scale: Annotated[
+        str | None,
+        typer.Option(help="Original model: (g - x0) per axis, or the start-goal distance."),
+    ] = None,
+    regression: Annotated[str | None, typer.Option(help="lwr or ridge.")] = None,
+    basis: Annotated[int | None, typer.Option(help="N, number of Gaussian functions.")] = None,
+    damping: Annotated[float | None, typer.Option(help="d; k = d²/4.")] = None,
+    tau: Annotated[
+        float | None, typer.Option(help="Time constant in units of the stroke's duration.")
+    ] = None,
+    alpha_1: Annotated[float | None, typer.Option("--alpha-1", help="Phase constant.")] = None,
+    widths: Annotated[
+        str | None, typer.Option(help="Width rule of the Gaussians: spacing or power.")
+    ] = None,
+    cutoff: Annotated[
+        float | None,
+        typer.Option(help="Low-pass, Hz. Default: the highest that N functions can carry."),
+    ] = None,
+    trim: Annotated[
+        bool | None, typer.Option("--trim/--no-trim", help="Cut off idle ends (default).")
+    ] = None,
+    preset: Annotated[str, typer.Option(help="default, paper, or a TOML file.")] = "default",
+    config: Annotated[Path | None, typer.Option(help="TOML file with a [fit] section.")] = None,
+    layout: Annotated[
+        str | None, typer.Option(help="Columns and units of a known recorder: ur or tum.")
+    ] = None,
+    map_: Annotated[
+        list[str] | None,
+        typer.Option("--map", help="OURS=THEIRS, as t=time or x=tool_x; may be repeated."),
+    ] = None,
+    length_unit: Annotated[str | None, typer.Option(help="mm, cm, m or in.")] = None,
+    time_unit: Annotated[str | None, typer.Option(help="s, ms, us or ns.")] = None,
+    angle_unit: Annotated[str | None, typer.Option(help="rad or deg.")] = None,
+    rotation: Annotated[
+        str | None,
+        typer.Option(help="What rx ry rz are: euler or rotvec; or quaternion: qx qy qz qw."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
+) -> None:
+    """Learn a skill from one or several demonstrations."""
+    from dmpcli.commands.messages import about, tell
+    from dmpcli.primitives.learning import fit
+    from dmpcli.records import recordings, skill, streams
+    from dmpcli.records.fit_settings import FitSettings
+    from dmpcli.records.record import Provenance
+    from dmpcli.records.settings import resolve
+
+    settings = resolve(
+        FitSettings,
+        "fit",
+        {
+            "model": model,
+            "forcing_scale": forcing_scale,
+            "regression": regression,
+            "basis": basis,
+            "damping": damping,
+            "tau": tau,
+            "alpha_1": alpha_1,
+            "widths": widths,
+            "cutoff": cutoff,
+            "trim": trim,
+        },
+        preset,
+        config,
+    )
+    columns = _layout(layout, map_ or [], length_unit, time_unit, angle_unit, rotation)
+    streams.check_writable(output)
+    if [str(path) for path in demonstrations].count(streams.DASH) > 1:
+        raise InputError("-: standard input can be read only once")
+    sources = [streams.read(path) for path in demonstrations]
+    strokes = [recordings.stroke(source, columns) for source in sources]
+    with about(", ".join(source.name for source in sources)):
+        result = fit(strokes, settings.choices())
+
+    reproduction = [
+        skill.Reproduction(
+            sha256=source.sha256,
+            duration=prepared.stroke.duration,
+            rms=r.rms,
+            largest=r.largest,
+            end=r.end,
+            smoothing=prepared.removed,
+        )
+        for source, prepared, r in zip(sources, result.prepared, result.reproductions, strict=True)
+    ]
+    options = settings.model_dump()
+    if columns is not None:
+        options["layout"] = columns.as_options()
+    inputs = tuple({"role": "demonstration", "sha256": s.sha256} for s in sources)
+    streams.write(
+        output, skill.encode(result.skill, reproduction, Provenance("fit", options, inputs))
+    )
+    tell(_summary(str(output), [s.name for s in sources], result), quiet)
+
+
+def _layout(
+    known: str | None,
+    mapping: list[str],
+    length: str | None,
+    time: str | None,
+    angle: str | None,
+    rotation: str | None,
+) -> "Layout | None":
+    """Return the layout that the options describe; None where they say nothing."""
+    from dmpcli.records import recordings
+
+    given = {"length": length, "time": time, "angle": angle, "rotation": rotation}
+    if known is None and not mapping and not any(given.values()):
+        return None
+    if known is not None and known not in recordings.LAYOUTS:
+        raise InputError(
+            f"--layout {known}: no such layout; there are {', '.join(recordings.LAYOUTS)}"
+        )
+    base = recordings.LAYOUTS[known] if known else recordings.Layout()
+    return recordings.adapted(base, mapping, {k: v for k, v in given.items() if v is not None})
+
+
+def _summary(output: str, names: list[str], result: "Fit") -> str:
+    """Return what a person wants to know of a fit, a line per demonstration."""
+    from dmpcli.measures.wave import wave_heights
+
+    skill = result.skill
+    kind = "closed" if skill.closed else f"start to goal {skill.frame.length:.3f} mm"
+    lines = [f"{output}: {skill.model} DMP, N = {len(skill.basis)}, {skill.duration:.3f} s, {kind}"]
+    exempt = [
+        name
+        for name, without in zip(("x", "y", "z", "rx", "ry", "rz"), skill.exempt, strict=True)
+        if without and skill.forcing_scale == "axis"
+    ]
+    if exempt:
+        lines.append(
+            f"  g - x0 is nearly zero in {', '.join(exempt)}: fitted with factor 1 instead"
+        )
+    for name, prepared, r in zip(names, result.prepared, result.reproductions, strict=True):
+        before, after = prepared.trimmed
+        lines.append(
+            f"  {name}: reproduction RMS {r.rms:.4f} mm, largest {r.largest:.4f}, "
+            f"end {r.end:.4f}; smoothing ({prepared.cutoff:.2f} Hz) took off "
+            f"{prepared.removed:.4f} mm RMS; trimmed {before:.2f} s and {after:.2f} s"
+        )
+        if not skill.closed:
+            demonstrated = wave_heights(r.demonstrated[:, 1])
+            reproduced = wave_heights(r.reproduced[:, 1])
+            if len(demonstrated.heights):
+                lines.append(
+                    f"  wave height {demonstrated.mean:.3f} mm demonstrated, "
+                    f"{reproduced.mean:.3f} mm reproduced"
+                )
+    return "\n".join(lines)

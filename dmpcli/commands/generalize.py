@@ -1,0 +1,358 @@
+"""``dmpcli generalize``: a skill and new start-goal pairs in, trajectories out."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dmpcli.errors import InputError, RefusedError
+
+if TYPE_CHECKING:
+    from dmpcli.primitives.admission import Admission
+    from dmpcli.primitives.skill import Skill
+    from dmpcli.records.generalize_settings import GeneralizeSettings
+    from dmpcli.records.pairs import PairTable
+    from dmpcli.records.record import Provenance
+    from dmpcli.surfaces.plane import Plane
+
+PAIRS_PER_PART = 2000
+
+Point = tuple[float, float, float]
+
+
+def command(
+    skill: Annotated[
+        Path, typer.Argument(help="Skill file of fit; - is standard input.", show_default=False)
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="Trajectory file (Parquet), or with --pairs a folder.",
+            show_default=False,
+        ),
+    ],
+    start: Annotated[Point | None, typer.Option(help="New start X Y Z, mm.")] = None,
+    goal: Annotated[Point | None, typer.Option(help="New goal X Y Z, mm.")] = None,
+    start_orientation: Annotated[
+        Point | None, typer.Option(help="Tool orientation at the start, RX RY RZ, rad.")
+    ] = None,
+    goal_orientation: Annotated[
+        Point | None, typer.Option(help="Tool orientation at the goal, RX RY RZ, rad.")
+    ] = None,
+    pairs: Annotated[
+        Path | None,
+        typer.Option(help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration]."),
+    ] = None,
+    surface: Annotated[
+        Path | None, typer.Option(help="Plane to draw on, plane.json: point and normal.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Of the stroke, s. Default: as demonstrated.")
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Samples per second, Hz (50).")] = None,
+    amplitude: Annotated[
+        str | None, typer.Option(help="keep the wave height, or scale it with the distance.")
+    ] = None,
+    orientation: Annotated[
+        str | None,
+        typer.Option(help="keep the tool's turn in base axes, or turn with the surface."),
+    ] = None,
+    ease_in: Annotated[float | None, typer.Option(help="Soft start, s.")] = None,
+    ease_out: Annotated[float | None, typer.Option(help="Soft end, s.")] = None,
+    snap_tol: Annotated[
+        float | None, typer.Option(help="How far start and goal may lie off the surface, mm (1).")
+    ] = None,
+    on_error: Annotated[
+        str, typer.Option(help="A bad pair stops all before anything is written, or is skipped.")
+    ] = "stop",
+    preset: Annotated[
+        str | None, typer.Option(help="TOML file with a [generalize] section.")
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="The same; beats the preset.")] = None,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
+) -> None:
+    """Draw a skill at new start and goal points."""
+    from dmpcli.records import plane as plane_file
+    from dmpcli.records import skill as skill_file
+    from dmpcli.records import streams
+    from dmpcli.records.generalize_settings import GeneralizeSettings
+    from dmpcli.records.record import Provenance
+    from dmpcli.records.settings import resolve
+
+    settings = resolve(
+        GeneralizeSettings,
+        "generalize",
+        {
+            "duration": duration,
+            "rate": rate,
+            "amplitude": amplitude,
+            "orientation": orientation,
+            "ease_in": ease_in,
+            "ease_out": ease_out,
+            "snap_tol": snap_tol,
+        },
+        preset,
+        config,
+    )
+    if on_error not in ("stop", "skip"):
+        raise InputError(f"--on-error {on_error}: must be stop or skip")
+    _check_destination(output, start, goal, pairs)
+    source = streams.read(skill)
+    learned, _ = skill_file.decode(source)
+    inputs = [{"role": "skill", "sha256": source.sha256}]
+    given = None
+    if surface is not None:
+        surface_source = streams.read(surface)
+        given = _facing(plane_file.decode(surface_source), learned, str(surface), quiet)
+        inputs.append({"role": "surface", "sha256": surface_source.sha256})
+    options = settings.model_dump()
+    if pairs is None:
+        assert start is not None
+        assert goal is not None
+        table = _one_pair(start, goal, start_orientation, goal_orientation)
+        options |= {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
+    else:
+        from dmpcli.records import pairs as pair_file
+
+        pairs_source = streams.read(pairs)
+        table = pair_file.read(pairs_source)
+        inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
+        options["on_error"] = on_error
+    _check_orientations(learned, table)
+    _judge(learned, table, given, settings, on_error)
+    provenance = Provenance("generalize", options, tuple(inputs))
+    if pairs is None:
+        _write_one(learned, table, given, settings, provenance, output, quiet)
+    else:
+        _write_batch(learned, table, given, settings, provenance, output, quiet)
+
+
+def _check_destination(
+    output: Path, start: Point | None, goal: Point | None, pairs: Path | None
+) -> None:
+    from dmpcli.commands.options import finite
+    from dmpcli.records import streams
+
+    if pairs is None:
+        if start is None or goal is None:
+            raise InputError("give --start X Y Z and --goal X Y Z, or a table with --pairs")
+        finite("--start", start)
+        finite("--goal", goal)
+        streams.check_writable(output)
+        return
+    if start is not None or goal is not None:
+        raise InputError("--pairs names the starts and goals; leave --start and --goal out")
+    streams.check_folder(output)
+
+
+def _one_pair(
+    start: Point, goal: Point, start_orientation: Point | None, goal_orientation: Point | None
+) -> "PairTable":
+    import numpy as np
+
+    from dmpcli import rotations
+    from dmpcli.commands.options import finite
+    from dmpcli.primitives.generalization import Pairs
+    from dmpcli.records.pairs import OK, PairTable
+
+    def rotation(name: str, angles: Point | None) -> Any:
+        if angles is None:
+            return None
+        finite(name, angles)
+        return rotations.from_euler(np.array([angles]))
+
+    return PairTable(
+        "--start and --goal",
+        ["1"],
+        Pairs(
+            np.array([start]),
+            np.array([goal]),
+            rotation("--start-orientation", start_orientation),
+            rotation("--goal-orientation", goal_orientation),
+        ),
+        np.array([np.nan]),
+        [OK],
+    )
+
+
+def _facing(plane: "Plane", skill: "Skill", name: str, quiet: bool) -> "Plane":
+    """Turn the plane's normal to the tool's side, and say so where that flips it."""
+    from dmpcli.commands.messages import tell
+
+    R = skill.frame.rotation
+    facing = plane.facing(None if R is None else R[:, 2])
+    if facing.normal @ plane.normal < 0:
+        tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
+    return facing
+
+
+def _check_orientations(skill: "Skill", table: "PairTable") -> None:
+    asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
+    if not skill.oriented and any(rotation is not None for rotation in asked):
+        raise InputError(
+            f"{table.name}: asks for tool orientations, but the skill was demonstrated without; "
+            "leave them out, or fit a demonstration that has them"
+        )
+
+
+def _judge(
+    skill: "Skill",
+    table: "PairTable",
+    given: "Plane | None",
+    settings: "GeneralizeSettings",
+    on_error: str,
+) -> None:
+    """Write what stands against a pair into its status; with `stop` the first one ends all."""
+    import numpy as np
+
+    from dmpcli.primitives.admission import admit
+    from dmpcli.records.pairs import OK
+
+    rows = np.flatnonzero(table.good)
+    verdict = admit(
+        skill,
+        table.pairs[rows],
+        _durations(skill, table, settings)[rows],
+        settings.style(),
+        given,
+        settings.snap_tol,
+    )
+    for i in np.flatnonzero(~verdict.admitted):
+        table.status[int(rows[i])] = f"pair {table.ids[int(rows[i])]}: " + _reason(
+            verdict, int(i), settings.snap_tol
+        )
+    if on_error == "skip":
+        return
+    upright = {int(rows[i]) for i in np.flatnonzero(verdict.upright)}
+    for row, status in enumerate(table.status):
+        if status != OK:
+            raise (RefusedError if row in upright else InputError)(f"{table.name}: {status}")
+
+
+def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> Any:
+    import numpy as np
+
+    default = settings.duration or skill.duration
+    return np.where(np.isnan(table.duration), default, table.duration)
+
+
+def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
+    if verdict.coincident[i]:
+        return "start and goal are one point, and the stroke is open; set them apart"
+    if verdict.short[i]:
+        return (
+            "--ease-in and --ease-out together are longer than twice the stroke; "
+            "shorten them, or give a longer --duration"
+        )
+    if verdict.far[i]:
+        return (
+            f"start or goal lies {verdict.distance[i]:.3f} mm off the plane, more than "
+            f"--snap-tol {tolerance:g}; move the point, or raise the tolerance"
+        )
+    return (
+        "the line from start to goal stands upright on the plane, so that no chart follows; "
+        "give the plane to draw on with --surface plane.json"
+    )
+
+
+def _normal(skill: "Skill", given: "Plane | None") -> Any:
+    return skill.frame.normal if given is None else given.normal
+
+
+def _write_one(
+    skill: "Skill",
+    table: "PairTable",
+    given: "Plane | None",
+    settings: "GeneralizeSettings",
+    provenance: "Provenance",
+    output: Path,
+    quiet: bool,
+) -> None:
+    from dataclasses import replace
+
+    import numpy as np
+
+    from dmpcli.commands.messages import tell
+    from dmpcli.primitives.admission import snapped
+    from dmpcli.primitives.drawing import draw
+    from dmpcli.records import record, streams, trajectory
+
+    pairs = table.pairs if given is None else snapped(table.pairs, given)
+    duration = _durations(skill, table, settings)
+    stroke = draw(skill, pairs, duration, _normal(skill, given), settings.style())[0]
+    facts = trajectory.facts_of(skill) | trajectory.facts_of_stroke(
+        stroke, settings.rate, pairs.start[0], pairs.goal[0]
+    )
+    done = trajectory.trajectory_record(table.ids, [stroke], replace(provenance, facts=facts))
+    streams.write(output, record.encode(done))
+    moved = np.linalg.norm([pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2)
+    if moved.max() > 0:
+        tell(
+            f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the plane", quiet
+        )
+    miss = np.linalg.norm(stroke.position[-1] - pairs.goal[0])
+    tell(
+        f"{output}: {skill.model} DMP, {len(stroke.position)} poses, "
+        f"{stroke.timing.t[-1]:.3f} s at {settings.rate:g} Hz, ends {miss:.4f} mm from the goal",
+        quiet,
+    )
+
+
+def _write_batch(
+    skill: "Skill",
+    table: "PairTable",
+    given: "Plane | None",
+    settings: "GeneralizeSettings",
+    provenance: "Provenance",
+    output: Path,
+    quiet: bool,
+) -> None:
+    """Write part files in pair order, and last `pairs.parquet` with a status per pair."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from dmpcli.commands.messages import progress, tell, warn
+    from dmpcli.primitives.admission import snapped
+    from dmpcli.primitives.drawing import draw
+    from dmpcli.records import record, streams, trajectory
+
+    pairs = table.pairs if given is None else snapped(table.pairs, given)
+    good = np.flatnonzero(table.good)
+    if len(good) == 0:
+        raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
+    duration = _durations(skill, table, settings)
+    normal = np.full((len(table), 3), np.nan)
+    part_of = [""] * len(table)
+    facts = trajectory.facts_of(skill) | {"rate": settings.rate}
+    streams.begin_folder(output)
+    with progress("drawing", len(good), quiet) as advance:
+        for number in range(0, len(good), PAIRS_PER_PART):
+            rows = good[number : number + PAIRS_PER_PART]
+            name = f"part-{number // PAIRS_PER_PART:05d}.parquet"
+            strokes = draw(
+                skill, pairs[rows], duration[rows], _normal(skill, given), settings.style()
+            )
+            for row, stroke in zip(rows, strokes, strict=True):
+                normal[row], duration[row] = stroke.normal, stroke.timing.t[-1]
+                part_of[row] = name
+            done = trajectory.trajectory_record(
+                [table.ids[row] for row in rows], strokes, replace(provenance, facts=facts)
+            )
+            streams.write(output / name, record.encode(done))
+            advance(len(rows))
+    done = trajectory.pairs_record(
+        table.ids, pairs, duration, normal, part_of, table.status, replace(provenance, facts=facts)
+    )
+    streams.write(output / "pairs.parquet", record.encode(done))
+    for status in table.status:
+        if status != "ok":
+            warn(f"{table.name}: skipped: {status}")
+    skipped = len(table) - len(good)
+    summary = f"{output}: {len(good)} strokes drawn, {skipped} pairs skipped"
+    if skipped:
+        warn(summary)
+    else:
+        tell(summary, quiet)

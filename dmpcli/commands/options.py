@@ -1,0 +1,19 @@
+"""Checks of option values that need no file and no settings model."""
+
+import math
+from collections.abc import Sequence
+
+from dmpcli.errors import InputError
+
+
+def finite(option: str, values: Sequence[float]) -> None:
+    """Refuse NaN and infinity, which the option parser lets pass.
+
+    Raises
+    ------
+    InputError
+        Names the option and the value.
+    """
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{option}: {value} is not a finite number")

@@ -1,0 +1,91 @@
+"""The mock experiment: plate, pen and practised hand around one reference stroke."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.drag.references import DURATION, Reference
+from dmpcli.drag.settings import RecordSettings
+from dmpcli.drag.tutor import HandParameters, Tutor
+from dmpcli.errors import InputError
+from dmpcli.instruments.mock import Lab, Plate, Scene
+
+# The hand takes hold where the pen stands; further away it would tug the pen over the plate.
+_REACH = 10.0
+# A hand comes to rest in less than this after its stroke, s.
+_SETTLING = 5.0
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """Who draws, and for how long at most.
+
+    Attributes
+    ----------
+    begin : callable
+        Tells the tutor the time at which the recording begins, s.
+    longest : float
+        How long the recording may take, s; infinite where a person ends it.
+    """
+
+    begin: Callable[[float], None]
+    longest: float
+
+
+def scene(reference: Reference, settings: RecordSettings) -> Scene:
+    """Lay a plate under the stroke and set the pen down on it without pressing.
+
+    The stroke is where the pressed pen runs, so the plate's surface lies higher by as much as the
+    hand presses the pen in.
+
+    Parameters
+    ----------
+    reference : Reference
+    settings : RecordSettings
+
+    Returns
+    -------
+    Scene
+    """
+    plate = Plate(point=reference.start, normal=reference.normal)
+    surface = reference.start + HandParameters().press / plate.stiffness * reference.normal
+    return Scene(
+        position=surface,
+        plate=Plate(point=surface, normal=reference.normal),
+        seed=settings.seed,
+    )
+
+
+def rehearse(lab: Lab | None, reference: Reference, settings: RecordSettings) -> Rehearsal:
+    """Put the tutor's hand on the lab's tool; without a lab a person draws.
+
+    The stroke and the rests around it fill `duration`; without one the stroke takes 10 s.
+
+    Parameters
+    ----------
+    lab : Lab or None
+    reference : Reference
+    settings : RecordSettings
+
+    Raises
+    ------
+    InputError
+        The tool does not stand where the stroke begins.
+    """
+    if lab is None:
+        return Rehearsal(lambda _: None, settings.duration or np.inf)
+    away = float(np.linalg.norm(lab.arm.position - reference.start))
+    if away > _REACH:
+        raise InputError(
+            f"--robot: the mock's pen stands {away:.1f} mm from the start of the stroke; "
+            "leave x, y, z out of the URL, or give --start"
+        )
+    hand = HandParameters()
+    duration = settings.duration or DURATION + 2.0 * hand.rest
+    tutor = Tutor(reference, lab.arm.rotation, duration, settings.seed, hand)
+    lab.hand = tutor
+    longest = duration
+    if settings.duration is None and settings.until_rest is not None:
+        longest += settings.until_rest + _SETTLING
+    return Rehearsal(tutor.begin, longest)

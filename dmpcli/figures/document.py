@@ -1,0 +1,160 @@
+"""The report as one document of plain values, and its forms: JSON, tables, wave heights as CSV."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rich.table import Table
+
+from dmpcli import __version__
+from dmpcli.figures import measured, paper_tables, tables
+from dmpcli.figures.measured import Row
+from dmpcli.figures.stroke import Stroke
+from dmpcli.records.record import Record
+from dmpcli.records.skill import SkillFile
+
+NAME, VERSION = "report", 1
+UNITS = {"length": "mm", "time": "s", "speed": "mm/s", "ldlj": "1", "sparc": "1"}
+
+MOST_ROWS = 20
+"""A file of more strokes than this is reported by its statistics."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One input of the report.
+
+    Attributes
+    ----------
+    name : str
+        What tables call it.
+    sha256 : str
+    schema : str
+    strokes : list of Stroke
+    run : Record, optional
+        The record itself, where it is a run.
+    skill : SkillFile, optional
+        Where it is one.
+    states : dict, optional
+        Of a batch: how many pairs ended in each status.
+    """
+
+    name: str
+    sha256: str
+    schema: str
+    strokes: list[Stroke] = field(default_factory=list)
+    run: Record | None = None
+    skill: SkillFile | None = None
+    states: dict[str, int] | None = None
+
+
+def reference_of(parts: Sequence[Part]) -> Stroke | None:
+    """Return the demonstration that deviations are taken from: the first, built-in drag last."""
+    taught = [s for part in parts for s in part.strokes if s.kind == "demonstration"]
+    return next((s for s in taught if s.role == "demonstration"), taught[0] if taught else None)
+
+
+def document(parts: Sequence[Part]) -> Row:
+    """Measure everything; the same inputs give the same document.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        In the order of the command line.
+    """
+    reference = reference_of(parts)
+    strokes = [stroke for part in parts for stroke in part.strokes]
+    return {
+        "schema": NAME,
+        "version": VERSION,
+        "tool": __version__,
+        "units": UNITS,
+        "reference": reference.label if reference else None,
+        "files": [_entry(part, reference) for part in parts],
+        "paper": paper_tables.comparisons(strokes),
+    }
+
+
+def as_json(report: Row) -> bytes:
+    """Return the document as a JSON file."""
+    text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode()
+
+
+def as_csv(parts: Sequence[Part]) -> bytes:
+    """Return every wave height of every stroke as a row of a CSV file."""
+    sink = io.StringIO()
+    rows = csv.writer(sink, lineterminator="\n")
+    rows.writerow("stroke role wave height_mm from_t_s to_t_s from_v_mm to_v_mm".split())
+    for stroke in (stroke for part in parts for stroke in part.strokes):
+        wave = stroke.wave
+        t = wave.at(stroke.t)
+        for i, height in enumerate(wave.heights):
+            values = (height, t[i], t[i + 1], wave.value[i], wave.value[i + 1])
+            rows.writerow([stroke.label, stroke.role, i + 1, *(f"{x:.6f}" for x in values)])
+    return sink.getvalue().encode()
+
+
+def as_text(report: Row, width: int) -> str:
+    """Return the document as tables for people, `width` columns wide, without terminal codes."""
+    parts: list[Table | str] = []
+    rows = _rows(report)
+    if rows:
+        parts += [tables.shape(rows), *_remarks(report, rows), ""]
+        for table in (tables.waves(rows), tables.motion(rows), tables.drag(rows)):
+            parts += [table, ""] if table else []
+    for entry in report["files"]:
+        if entry["statistics"]:
+            parts += [tables.statistics(entry["file"], entry), ""]
+        if entry["states"]:
+            counted = ", ".join(f"{n} {status}" for status, n in entry["states"].items())
+            parts += [f"{entry['file']}: {counted}", ""]
+    runs = [(e["file"], e["deadlines"]) for e in report["files"] if e["deadlines"]]
+    if runs:
+        parts += [tables.deadlines(runs), ""]
+    skills = [(e["file"], e["skill"]) for e in report["files"] if e["skill"]]
+    if skills:
+        parts += [tables.skills(skills), ""]
+    for comparison in report["paper"]:
+        parts += [tables.paper(comparison), *comparison["notes"], ""]
+    return tables.plain(parts[:-1], width)
+
+
+def _entry(part: Part, reference: Stroke | None) -> Row:
+    rows = [measured.row_of(stroke, reference) for stroke in part.strokes]
+    many = len(rows) > MOST_ROWS
+    return {
+        "file": part.name,
+        "sha256": part.sha256,
+        "schema": part.schema,
+        "count": len(rows),
+        "strokes": [] if many else rows,
+        "statistics": measured.statistics_of(rows) if many else None,
+        "states": part.states,
+        "deadlines": measured.deadlines_of(part.run) if part.run else None,
+        "skill": measured.skill_of(part.skill) if part.skill else None,
+    }
+
+
+def _rows(report: Row) -> list[Row]:
+    return [row for entry in report["files"] for row in entry["strokes"]]
+
+
+def _remarks(report: Row, rows: Sequence[Row]) -> list[str]:
+    remarks = []
+    if report["reference"] and any(row["deviation"] for row in rows):
+        remarks.append(f"Deviation from {report['reference']}, start and goal aligned.")
+    for row in rows:
+        raw = row["as_recorded"]
+        if raw:
+            height = tables.number(raw["wave_height"], 3)
+            kind = "simulated demonstration" if row["simulated"] else "demonstration"
+            remarks.append(
+                f"{row['stroke']}: {kind}, smoothed as fit does; as recorded the height is "
+                f"{height}, smoothing took off {raw['removed_rms']:.3f} RMS."
+            )
+        if row["closed"]:
+            remarks.append(f"{row['stroke']}: closed, so there is no line to measure waves from.")
+    return remarks

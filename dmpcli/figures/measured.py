@@ -1,0 +1,149 @@
+"""What a report says of each stroke, as plain values: the rows of its tables and of its JSON.
+
+Lengths in mm, times in s; None where a figure does not exist.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from dmpcli.figures.stroke import Stroke
+from dmpcli.measures import path
+from dmpcli.measures.deviation import deviation, nearest_distance
+from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
+from dmpcli.measures.timing import punctuality
+from dmpcli.records.record import Record
+from dmpcli.records.skill import SkillFile
+
+Row = dict[str, Any]
+
+
+def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
+    """Measure one stroke.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    reference : Stroke, optional
+        The demonstration; the stroke's deviation is taken from it, start and goal aligned.
+    """
+    start_error, goal_error = path.end_errors(stroke.position, stroke.start, stroke.goal)
+    return {
+        "stroke": stroke.label,
+        "kind": stroke.kind,
+        "role": stroke.role,
+        "simulated": stroke.simulated,
+        "closed": stroke.closed,
+        "samples": len(stroke.t),
+        "start": stroke.start.tolist(),
+        "goal": stroke.goal.tolist(),
+        "duration": path.duration(stroke.t),
+        "length": path.path_length(stroke.position),
+        "peak_speed": path.peak_speed(stroke.t, stroke.position),
+        "wave": _wave(stroke),
+        "as_recorded": _as_recorded(stroke),
+        "deviation": _deviation(stroke, reference),
+        "guide": _from_guide(stroke),
+        "ldlj": _finite(log_dimensionless_jerk(stroke.t, stroke.raw)),
+        "sparc": _finite(spectral_arc_length(stroke.t, stroke.raw)),
+        "start_error": start_error if stroke.intended else None,
+        "goal_error": goal_error if stroke.intended else None,
+    }
+
+
+def deadlines_of(run: Record) -> Row:
+    """Punctuality and tracking of a run, over all its servo cycles."""
+    lateness = np.asarray(run.columns["lateness"], dtype=float)
+    deadline = np.asarray(run.columns["deadline"], dtype=float)
+    period = float(np.median(np.diff(deadline))) if len(deadline) > 1 else math.inf
+    off = np.linalg.norm(run.position() - run.position("plan"), axis=1)
+    return {
+        "period": _finite(period),
+        **asdict(punctuality(lateness, period)),
+        "tracking_rms": float(np.sqrt(np.mean(off**2))),
+        "tracking_max": float(off.max()),
+    }
+
+
+def skill_of(skill: SkillFile) -> Row:
+    """What a skill says of itself: its model, and how well it gives back each demonstration."""
+    return {
+        "model": skill.model,
+        "forcing_scale": skill.forcing_scale,
+        "basis": skill.basis,
+        "duration": skill.duration,
+        "closed": skill.closed,
+        "reproductions": [part.model_dump(mode="json") for part in skill.reproduction],
+    }
+
+
+def statistics_of(rows: Sequence[Row]) -> Row:
+    """Least, median and largest of each figure over many strokes; None where none has it."""
+    values = {
+        "wave_height": [row["wave"]["mean"] for row in rows],
+        "nearest_rms": [(row["deviation"] or {}).get("nearest_rms") for row in rows],
+        "nearest_max": [(row["deviation"] or {}).get("nearest_max") for row in rows],
+        **{
+            key: [row[key] for row in rows]
+            for key in ("length", "duration", "ldlj", "sparc", "start_error", "goal_error")
+        },
+    }
+    return {key: _spread([x for x in column if x is not None]) for key, column in values.items()}
+
+
+def _spread(values: list[float]) -> Row | None:
+    if not values:
+        return None
+    least, median, largest = np.quantile(values, [0.0, 0.5, 1.0]).tolist()
+    return {"count": len(values), "least": least, "median": median, "largest": largest}
+
+
+def _wave(stroke: Stroke) -> Row:
+    wave = stroke.wave
+    t, where = wave.at(stroke.t), wave.at(stroke.position)
+    return {
+        "mean": wave.mean,
+        "spread": wave.spread,
+        "heights": wave.heights.tolist(),
+        "extrema": [
+            {"t": float(t[i]), "v": float(wave.value[i]), "position": where[i].tolist()}
+            for i in range(len(wave.value))
+        ],
+    }
+
+
+def _as_recorded(stroke: Stroke) -> Row | None:
+    """What smoothing took off a demonstration, and the wave height without smoothing."""
+    if stroke.raw is stroke.position:
+        return None
+    removed = np.linalg.norm(stroke.raw - stroke.position, axis=1)
+    raw = replace(stroke, position=stroke.raw)
+    return {
+        "wave_height": raw.wave.mean,
+        "removed_rms": float(np.sqrt(np.mean(removed**2))),
+        "removed_max": float(removed.max()),
+    }
+
+
+def _deviation(stroke: Stroke, reference: Stroke | None) -> Row | None:
+    if reference is None or reference is stroke:
+        return None
+    aligned = reference.carried_to(stroke)
+    if aligned is None:
+        return None
+    return asdict(deviation(stroke.t, stroke.position, reference.t, aligned))
+
+
+def _from_guide(stroke: Stroke) -> Row | None:
+    """How far a demonstration strays from the curve it was dragged along, as recorded."""
+    if stroke.guide is None:
+        return None
+    apart = nearest_distance(stroke.raw, stroke.guide)
+    return {"rms": float(np.sqrt(np.mean(apart**2))), "max": float(apart.max())}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

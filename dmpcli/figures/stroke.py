@@ -1,0 +1,321 @@
+"""A stroke: one curve of a file, with what is needed to measure and to draw it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import Floats, Integers
+from dmpcli.errors import InputError
+from dmpcli.measures.deviation import carried
+from dmpcli.measures.wave import WaveHeights, stroke_wave
+from dmpcli.primitives import preparation, references, smoothing
+from dmpcli.records import schemas
+from dmpcli.records.record import Provenance, Record
+from dmpcli.records.streams import DASH
+from dmpcli.surfaces import plane
+
+NEAR = 1.0
+"""Strokes whose starts and goals are this near to each other lie at the same place, mm."""
+
+LEAST = 5
+"""Fewer samples than this have no third derivative to speak of."""
+
+_NONE = WaveHeights(np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One curve of a demonstration, a trajectory or a run.
+
+    Attributes
+    ----------
+    label : str
+        What tables and legends call it.
+    kind : str
+        The file's schema: ``demonstration``, ``trajectory`` or ``run``.
+    role : str
+        ``demonstration``, ``builtin``, ``reference``, ``original axis``, ``original distance``,
+        ``modified``, ``run``: the key of its style and of the paper's tables.
+    t : array, shape (n,)
+        s, from 0.
+    position : array, shape (n, 3)
+        mm, base frame; of a demonstration as `fit` sees it: idle ends cut off, smoothed.
+    raw : array, shape (n, 3)
+        The same samples before smoothing.
+    start, goal : array, shape (3,)
+        Where it should begin and end, mm.
+    axes : array, shape (3, 3), or None
+        Chart axes along, across and off its plane as columns; None on a curved surface.
+    closed : bool
+    intended : bool
+        Whether the file says where the stroke should begin and end.
+    simulated : bool
+        No arm was there.
+    guide : array, shape (m, 3), optional
+        The curve that a demonstration was dragged along, where the file tells it, mm.
+    """
+
+    label: str
+    kind: str
+    role: str
+    t: Floats
+    position: Floats
+    raw: Floats
+    start: Floats
+    goal: Floats
+    axes: Floats | None
+    closed: bool
+    intended: bool
+    simulated: bool
+    guide: Floats | None = None
+
+    @cached_property
+    def wave(self) -> WaveHeights:
+        """Its wave heights; none for a line, a closed stroke or a curved surface."""
+        if self.closed or self.axes is None:
+            return _NONE
+        return stroke_wave(self.position, self.start, self.goal, self.axes[:, 2])
+
+    @property
+    def length(self) -> float:
+        """Start-goal distance, mm."""
+        return float(np.linalg.norm(self.goal - self.start))
+
+    def at_place_of(self, other: "Stroke") -> bool:
+        """Tell whether both strokes begin and end within 1 mm of each other."""
+        apart = np.linalg.norm([self.start - other.start, self.goal - other.goal], axis=1)
+        return bool(apart.max() <= NEAR)
+
+    def carried_to(self, other: "Stroke") -> Floats | None:
+        """Positions with start, goal and plane laid upon another stroke's, shape (n, 3), mm."""
+        if self.axes is None or other.axes is None:
+            return None
+        stretch = 1.0 if self.closed or other.closed else other.length / self.length
+        return carried(self.position, self.start, self.axes, other.start, other.axes, stretch)
+
+
+def strokes_of(
+    record: Record,
+    label: str,
+    normal: Floats | None = None,
+    pairs: Mapping[str, Mapping[str, Any]] | None = None,
+) -> list[Stroke]:
+    """Return the strokes of a run, one, or of a trajectory file, one per id.
+
+    Parameters
+    ----------
+    record : Record
+    label : str
+        What to call the file.
+    normal : array, shape (3,), optional
+        Normal of the plane that all strokes lie on; otherwise the file's own says.
+    pairs : mapping, optional
+        Of a batch: what is known of each id (start, goal, normal).
+
+    Raises
+    ------
+    InputError
+        A file of pairs, which holds no stroke, a stroke of fewer than 5 samples, or one whose time
+        does not increase.
+    """
+    facts = record.provenance.facts
+    if record.schema is schemas.RUN:
+        drawn = _part(record, np.flatnonzero(record.columns["phase"] == "stroke"))
+        known = dict(facts.get("trajectory", facts))
+        return [_planned(drawn, label, "run", normal, known, "plan")]
+    if record.schema is schemas.TRAJECTORY:
+        groups, role = _by_id(record.columns["id"]), role_of(facts)
+        strokes = []
+        for name, rows in groups.items():
+            known = facts | dict((pairs or {}).get(name, {}))
+            full = label if len(groups) == 1 else f"{label}[{name}]"
+            strokes.append(_planned(_part(record, rows), full, role, normal, known))
+        return strokes
+    raise InputError("holds start-goal pairs, not strokes; give the folder that it lies in")
+
+
+def role_of(facts: Mapping[str, Any]) -> str:
+    """Return the role of a trajectory from its facts."""
+    if facts.get("model") == "original":
+        return f"original {facts.get('forcing_scale', 'axis')}"
+    return "modified"
+
+
+def labels_of(names: Sequence[str]) -> list[str]:
+    """Short names of files: without folder and suffix where that keeps them apart."""
+    short = ["standard input" if name == DASH else Path(name).stem for name in names]
+    return [s if short.count(s) == 1 else name for s, name in zip(short, names, strict=True)]
+
+
+def demonstrated(
+    recording: smoothing.Stroke,
+    label: str,
+    normal: Floats | None = None,
+    origin: Provenance | None = None,
+) -> Stroke:
+    """Return a demonstration as `fit` sees it by default: idle ends cut off, smoothed.
+
+    Parameters
+    ----------
+    recording : smoothing.Stroke
+    label : str
+    normal : array, shape (3,), optional
+        Normal of the plane that it lies on; otherwise the best-fitting one.
+    origin : Provenance, optional
+        Of one of our own files: how it was dragged, along what, and whether it is simulated.
+
+    Raises
+    ------
+    InputError
+        The tool does not move, or hardly a sample of it does.
+    """
+    origin = origin or Provenance("")
+    even = smoothing.evenly_sampled(recording)
+    seen = preparation.prepare(even, preparation.Choices())
+    frame, count = seen.frame, len(seen.stroke.t)
+    _enough(count)
+    first = int(np.argmin(np.abs(even.t - seen.trimmed[0])))
+    axes = frame.axes
+    if normal is not None:
+        tool_axis = None if frame.rotation is None else frame.rotation[:, 2]
+        normal = normal * plane.side(normal, tool_axis)
+        axes = _axes(frame.start, frame.goal, normal, seen.closed)
+    return Stroke(
+        label,
+        schemas.DEMONSTRATION.name,
+        "builtin" if origin.options.get("drag") == "builtin" else "demonstration",
+        seen.stroke.t,
+        seen.stroke.position,
+        even.position[first : first + count],
+        frame.start,
+        frame.goal,
+        axes,
+        seen.closed,
+        False,
+        bool(origin.facts.get("simulated", False)),
+        _guide(origin.facts.get("reference")),
+    )
+
+
+def _guide(said: Any) -> Floats | None:
+    """Return the curve that a demonstration followed, as far as its facts describe one."""
+    if not isinstance(said, dict) or said.get("shape") not in ("sine", "line", "circle"):
+        return None
+    start, goal = (np.asarray(said[key], dtype=float) for key in ("start", "goal"))
+    normal = _axes(start, goal, np.array([0.0, 0.0, 1.0]), closed=False)[:, 2]
+    t = np.linspace(0.0, 1.0, 1001)
+    if said["shape"] == "line":
+        return references.line(start, goal, t, 1.0)
+    if said["shape"] == "circle":
+        return references.circle(start, goal, t, 1.0, normal)
+    return references.sine(
+        start, goal, said["wave_height"], t, 1.0, said.get("periods", 1.0), normal
+    )
+
+
+def _planned(
+    record: Record,
+    label: str,
+    role: str,
+    normal: Floats | None,
+    known: Mapping[str, Any],
+    plan: str = "",
+) -> Stroke:
+    """Return the one stroke of a record; `plan` names the columns that it should follow."""
+    t, position, ends = record.t, record.position(), record.position(plan)
+    intended = "start" in known and "goal" in known
+    start = np.asarray(known.get("start", ends[0]), dtype=float)
+    goal = np.asarray(known.get("goal", ends[-1]), dtype=float)
+    closed = bool(known.get("closed", plane.is_closed(ends))) or not np.any(goal - start)
+    given = _normal(known, record)
+    if normal is not None:
+        given = normal if given is None or given @ normal >= 0.0 else -normal
+    axes = None
+    if given is not None:
+        axes = _axes(start, goal, given, closed)
+    elif not record.has(*schemas.NORMAL):
+        axes = plane.stroke_axes(ends)
+    return Stroke(
+        label,
+        record.schema.name,
+        role,
+        t - t[0],
+        position,
+        position,
+        start,
+        goal,
+        axes,
+        closed,
+        intended,
+        bool(known.get("simulated", record.provenance.facts.get("simulated", False))),
+    )
+
+
+def _normal(known: Mapping[str, Any], record: Record) -> Floats | None:
+    """Return the one normal of a stroke's plane; None where it is not known or turns."""
+    if known.get("normal") is not None:
+        return np.asarray(known["normal"], dtype=float)
+    if not record.has(*schemas.NORMAL):
+        return None
+    normals = record.stack(schemas.NORMAL)
+    return normals[0] if np.ptp(normals, axis=0).max() < 1e-6 else None
+
+
+def _axes(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Floats:
+    n = normal / np.linalg.norm(normal)
+    if closed:
+        return plane.closed_axes(n)
+    return plane.open_axes((goal - start) / np.linalg.norm(goal - start), n)
+
+
+def _part(record: Record, rows: Integers) -> Record:
+    """Return some rows of a record, checked: enough of them, and time increases."""
+    _enough(len(rows))
+    back = np.flatnonzero(np.diff(record.t[rows]) <= 0.0)
+    if len(back):
+        raise InputError(
+            f"column 't', row {rows[back[0] + 1] + 1}: time does not increase; sort the rows"
+        )
+    return replace(record, columns={name: c[rows] for name, c in record.columns.items()})
+
+
+def _by_id(ids: Any) -> dict[str, Integers]:
+    """Rows of each id, in order of first appearance."""
+    borders = np.flatnonzero(np.concatenate([[True], ids[1:] != ids[:-1], [True]]))
+    runs: dict[str, list[Any]] = {}
+    for first, last in pairwise(borders.tolist()):
+        runs.setdefault(str(ids[first]), []).append(np.arange(first, last))
+    return {name: np.concatenate(rows) for name, rows in runs.items()}
+
+
+def _enough(count: int) -> None:
+    if count < LEAST:
+        raise InputError(f"a stroke of {count} samples cannot be measured; {LEAST} are needed")
+
+
+def pairs_of(pairs: Record) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
+    """Return what a batch knows of each id, and how many pairs ended in each status.
+
+    Parameters
+    ----------
+    pairs : Record
+        Of schema ``pairs``.
+    """
+    ids = [str(name) for name in pairs.columns["id"]]
+    start, goal = pairs.stack(["x0", "y0", "z0"]), pairs.stack(["xg", "yg", "zg"])
+    known: dict[str, dict[str, Any]] = {
+        name: {"start": start[i], "goal": goal[i]} for i, name in enumerate(ids)
+    }
+    if pairs.has(*schemas.NORMAL):
+        for name, normal in zip(ids, pairs.stack(schemas.NORMAL), strict=True):
+            if np.isfinite(normal).all():
+                known[name]["normal"] = normal
+    states: dict[str, int] = {}
+    for status in pairs.columns["status"]:
+        states[str(status)] = states.get(str(status), 0) + 1
+    return known, states

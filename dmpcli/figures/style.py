@@ -1,0 +1,46 @@
+"""One fixed style per role, so that a colour means the same in every figure.
+
+Colours are Okabe and Ito's, told apart by colour-blind eyes; line styles tell them apart in grey.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Style:
+    """How the curves of one role are drawn, and what the legend calls them."""
+
+    name: str
+    color: str
+    line: str | tuple[int, tuple[float, ...]]
+    width: float = 1.4
+    order: int = 3
+
+
+STYLES = {
+    "reference": Style("reference", "#D40000", "-", 1.0, 2),
+    "demonstration": Style("demonstration", "#000000", "-", 1.4, 3),
+    "builtin": Style("built-in drag", "#0072B2", (0, (6, 1.5)), 1.4, 3),
+    "original axis": Style("original DMP", "#009E73", "--", 1.6, 4),
+    "original distance": Style("original DMP by distance", "#009E73", "-.", 1.6, 4),
+    "modified": Style("modified DMP", "#E69F00", "-", 1.6, 5),
+    "run": Style("run, actual", "#9A4F96", (0, (1, 1)), 1.6, 6),
+}
+
+RC: Any = {
+    "font.size": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "legend.frameon": False,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "svg.hashsalt": "dmpcli",
+}
+"""matplotlib settings of every figure; the reader's own matplotlibrc has no say."""

@@ -1,0 +1,189 @@
+"""The report's tables, as rich renderables: numbers to the right, nothing wider than 80 columns."""
+
+import io
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from dmpcli.figures.measured import Row
+
+_NOTHING = "-"
+
+
+def number(value: float | None, digits: int) -> str:
+    """Return a number with so many decimals, or a dash where there is none."""
+    return _NOTHING if value is None else f"{value:.{digits}f}"
+
+
+def shape(rows: Sequence[Row]) -> Table:
+    """Wave heights, and deviation from the demonstration with start and goal aligned."""
+    table = _table(
+        "Shape, mm",
+        "stroke",
+        *("waves", "height", "spread", "nearest RMS", "nearest max", "phase RMS"),
+    )
+    for row in rows:
+        wave, off = row["wave"], row["deviation"] or {}
+        table.add_row(
+            row["stroke"],
+            str(len(wave["heights"])),
+            number(wave["mean"], 3),
+            number(wave["spread"], 3),
+            number(off.get("nearest_rms"), 4),
+            number(off.get("nearest_max"), 4),
+            number(off.get("phase_rms"), 4),
+        )
+    return table
+
+
+def waves(rows: Sequence[Row]) -> Table | None:
+    """Each height of the strokes that have several; None where none has."""
+    several = [row for row in rows if len(row["wave"]["heights"]) > 1]
+    if not several:
+        return None
+    table = _table("Each wave height, mm", "stroke")
+    table.add_column("from the start on", justify="left", overflow="fold")
+    for row in several:
+        table.add_row(row["stroke"], "  ".join(number(h, 3) for h in row["wave"]["heights"]))
+    return table
+
+
+def drag(rows: Sequence[Row]) -> Table | None:
+    """How closely each demonstration follows the curve it was dragged along; None without one."""
+    followed = [row for row in rows if row["guide"]]
+    if not followed:
+        return None
+    table = _table("Drag, distance from the reference, mm", "demonstration")
+    table.add_column("method")
+    for title in ("RMS", "max", "LDLJ", "SPARC"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in followed:
+        table.add_row(
+            row["stroke"],
+            "built-in" if row["role"] == "builtin" else "admittance",
+            number(row["guide"]["rms"], 3),
+            number(row["guide"]["max"], 3),
+            number(row["ldlj"], 2),
+            number(row["sparc"], 2),
+        )
+    return table
+
+
+def motion(rows: Sequence[Row]) -> Table:
+    """Length, time, smoothness and how far the ends are from where they should be."""
+    table = _table(
+        "Motion and ends",
+        "stroke",
+        *("length mm", "time s", "peak mm/s", "LDLJ", "SPARC", "start off", "goal off"),
+    )
+    for row in rows:
+        table.add_row(
+            row["stroke"],
+            number(row["length"], 2),
+            number(row["duration"], 2),
+            number(row["peak_speed"], 1),
+            number(row["ldlj"], 2),
+            number(row["sparc"], 2),
+            number(row["start_error"], 4),
+            number(row["goal_error"], 4),
+        )
+    return table
+
+
+def deadlines(runs: Sequence[tuple[str, Row]]) -> Table:
+    """Lateness of each run's set-points, and how closely the arm followed them."""
+    table = _table(
+        "Deadlines, lateness in ms; tracking in mm",
+        "run",
+        *("cycles", "p50", "p99", "max", "missed", "track RMS", "track max"),
+    )
+    for name, row in runs:
+        table.add_row(
+            name,
+            str(row["cycles"]),
+            *(number(1e3 * row[key], 3) for key in ("median", "p99", "worst")),
+            str(row["missed"]),
+            number(row["tracking_rms"], 3),
+            number(row["tracking_max"], 3),
+        )
+    return table
+
+
+def statistics(name: str, row: Row) -> Table:
+    """Least, median and largest figure of a file of many strokes."""
+    table = _table(f"{name}: {row['count']} strokes", "figure", "least", "median", "largest")
+    for key, title, digits in (
+        ("wave_height", "wave height, mm", 3),
+        ("nearest_rms", "nearest RMS, mm", 4),
+        ("nearest_max", "nearest max, mm", 4),
+        ("length", "length, mm", 2),
+        ("duration", "time, s", 2),
+        ("ldlj", "LDLJ", 2),
+        ("sparc", "SPARC", 2),
+        ("start_error", "start off, mm", 4),
+        ("goal_error", "goal off, mm", 4),
+    ):
+        spread = row["statistics"][key] or {}
+        table.add_row(
+            title, *(number(spread.get(k), digits) for k in ("least", "median", "largest"))
+        )
+    return table
+
+
+def skills(rows: Sequence[tuple[str, Row]]) -> Table:
+    """How well each skill gives back what it was taught."""
+    table = _table(
+        "Reproduction by skills, mm",
+        "skill",
+        *("model", "basis", "time s", "RMS", "max", "end", "smoothed off"),
+    )
+    for name, row in rows:
+        for part in row["reproductions"]:
+            table.add_row(
+                name,
+                row["model"],
+                str(row["basis"]),
+                number(part["duration"], 2),
+                *(number(part[key], 4) for key in ("rms", "largest", "end", "smoothing")),
+            )
+    return table
+
+
+def paper(comparison: Row) -> Table:
+    """One of the paper's tables, its wave heights beside ours."""
+    table = _table(f"Table {comparison['table']} of the paper: {comparison['title']}, mm", "stroke")
+    table.add_column("from", overflow="fold")
+    for title in ("paper", "ours", "ours - paper"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in comparison["rows"]:
+        table.add_row(
+            row["name"],
+            row["stroke"],
+            number(row["paper"], 3),
+            number(row["ours"], 3),
+            _NOTHING if row["difference"] is None else f"{row['difference']:+.3f}",
+        )
+    return table
+
+
+def _table(title: str, first: str, *others: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table.add_column(first, overflow="fold")
+    for name in others:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def plain(items: Sequence[Table | str], width: int) -> str:
+    """Render tables and lines of text, `width` columns wide, without any terminal codes."""
+    sink = io.StringIO()
+    console = Console(file=sink, width=width, color_system=None, force_terminal=False)
+    for item in items:
+        if isinstance(item, Table):
+            # rich would fold a title to the table's width.
+            title, item.title = item.title, None
+            if title:
+                console.print(title, highlight=False, markup=False)
+        console.print(item, highlight=False, markup=False)
+    return "".join(f"{line.rstrip()}\n" for line in sink.getvalue().splitlines())

@@ -1,0 +1,95 @@
+"""Which pairs a skill can be carried to, before anything is rolled out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats
+from dmpcli.primitives.drawing import Style
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.skill import Skill
+from dmpcli.surfaces.plane import Plane
+
+# Start and goal of an open stroke this near to each other have no direction, mm.
+COINCIDENT = 1e-6
+# Cosine beyond which a start-goal line stands upright on the plane.
+UPRIGHT = 1.0 - 1e-6
+
+
+@dataclass(frozen=True)
+class Admission:
+    """What stands against each pair; the masks have shape (B,).
+
+    Attributes
+    ----------
+    coincident : array of bool
+        An open stroke's start and goal are one point.
+    far : array of bool
+        Start or goal is further from the given plane than the tolerance.
+    upright : array of bool
+        The start-goal line stands upright on the plane, so that no chart follows.
+    short : array of bool
+        The stroke is too short for the soft start and end.
+    distance : array, shape (B,)
+        The larger distance of start and goal from the given plane, mm; 0 without one.
+    """
+
+    coincident: Booleans
+    far: Booleans
+    upright: Booleans
+    short: Booleans
+    distance: Floats
+
+    @property
+    def admitted(self) -> Booleans:
+        """Pairs that nothing stands against."""
+        return ~(self.coincident | self.far | self.upright | self.short)
+
+
+def admit(
+    skill: Skill,
+    pairs: Pairs,
+    duration: Floats,
+    style: Style,
+    given: Plane | None,
+    tolerance: float,
+) -> Admission:
+    """Check pairs against a skill and, where there is one, the plane to draw on.
+
+    Parameters
+    ----------
+    skill : Skill
+    pairs : Pairs
+        B pairs of finite coordinates.
+    duration : array, shape (B,)
+        Of each stroke without easing, s.
+    style : Style
+    given : Plane, optional
+    tolerance : float
+        Largest distance from the plane, mm.
+
+    Returns
+    -------
+    Admission
+    """
+    difference = pairs.goal - pairs.start
+    length = np.linalg.norm(difference, axis=1)
+    coincident = np.zeros(len(pairs), dtype=bool) if skill.closed else length < COINCIDENT
+    distance = np.zeros(len(pairs))
+    if given is not None:
+        heights = np.abs([given.height(pairs.start), given.height(pairs.goal)])
+        distance = np.max(heights, axis=0)
+    normal = skill.frame.normal if given is None else given.normal
+    upright = np.zeros(len(pairs), dtype=bool)
+    if not skill.closed and skill.model == "modified":
+        along = np.abs(difference @ normal) / np.where(coincident, 1.0, length)
+        upright = ~coincident & (along > UPRIGHT)
+    short = 2.0 * duration < style.ease_in + style.ease_out
+    return Admission(coincident, distance > tolerance, upright, short, distance)
+
+
+def snapped(pairs: Pairs, given: Plane) -> Pairs:
+    """Return the pairs with start and goal moved onto the plane along its normal."""
+    start = pairs.start - given.height(pairs.start)[:, None] * given.normal
+    goal = pairs.goal - given.height(pairs.goal)[:, None] * given.normal
+    return Pairs(start, goal, pairs.start_rotation, pairs.goal_rotation)

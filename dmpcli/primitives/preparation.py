@@ -1,0 +1,146 @@
+"""Preparing demonstrations: even, trimmed, smoothed, and in the coordinates that are learned."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.errors import InputError
+from dmpcli.primitives import smoothing
+from dmpcli.primitives.phase import WidthRule
+from dmpcli.primitives.regression import Method
+from dmpcli.primitives.skill import ForcingScale, Model, TaskFrame
+from dmpcli.primitives.smoothing import Signal, Stroke
+from dmpcli.surfaces import plane
+
+
+@dataclass(frozen=True)
+class Choices:
+    """How to learn; the presets name these.
+
+    Attributes
+    ----------
+    model, forcing_scale, regression
+        See `Skill` and `regression`.
+    basis : int
+        N.
+    damping : float
+        d; k = d²/4.
+    tau : float
+        In units of the demonstration's duration.
+    alpha_1 : float
+    widths : {'spacing', 'power'}
+    cutoff : float or None
+        Low-pass, Hz; None takes the highest frequency that the basis can carry, N / (2 T_d).
+    trim : bool
+        Whether idle ends are cut off.
+    """
+
+    model: Model = "modified"
+    forcing_scale: ForcingScale = "axis"
+    regression: Method = "lwr"
+    basis: int = 80
+    damping: float = 20.0
+    tau: float = 0.5
+    alpha_1: float = 1.0
+    widths: WidthRule = "spacing"
+    cutoff: float | None = None
+    trim: bool = True
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One demonstration, smoothed and in its own chart.
+
+    Attributes
+    ----------
+    stroke : Stroke
+        Smoothed, trimmed, even, from t = 0.
+    signal : Signal
+        The skill's six coordinates and derivatives, shape (T, 6).
+    frame : TaskFrame
+    closed : bool
+    removed : float
+        RMS of what smoothing took off the positions, mm.
+    trimmed : tuple of float
+        Idle time cut off before and after, s.
+    cutoff : float
+        Hz.
+    """
+
+    stroke: Stroke
+    signal: Signal
+    frame: TaskFrame
+    closed: bool
+    removed: float
+    trimmed: tuple[float, float]
+    cutoff: float
+
+
+def prepare(stroke: Stroke, choices: Choices) -> Prepared:
+    """Smooth and trim a demonstration, find its chart, and bring it there.
+
+    Raises
+    ------
+    InputError
+        The stroke does not move.
+    """
+    even = smoothing.evenly_sampled(stroke)
+    if plane.extent(even.position) == 0.0:
+        raise InputError("the tool does not move; record a stroke")
+    rate = (len(even.t) - 1) / even.duration
+    cutoff = choices.cutoff or choices.basis / (2.0 * even.duration)
+    smooth = smoothing.low_pass(even.position, rate, cutoff)
+    part = smoothing.moving_part(even.t, smooth) if choices.trim else slice(0, len(even.t))
+    if choices.cutoff is None and part != slice(0, len(even.t)):
+        # The stroke is shorter than the recording, so that the basis carries higher frequencies.
+        cutoff = choices.basis / (2.0 * float(np.ptp(even.t[part])))
+        smooth = smoothing.low_pass(even.position, rate, cutoff)
+    t, position = even.t[part] - even.t[part][0], smooth[part]
+    rotation = None if even.rotation is None else even.rotation[part]
+
+    axes = plane.stroke_axes(position, None if rotation is None else rotation[0, :, 2])
+    # The original model knows no chart: its six coordinates are those of the base frame.
+    C = axes if choices.model == "modified" else np.eye(3)
+    x = np.zeros((len(t), 6))
+    x[:, :3] = (position - position[0]) @ C if choices.model == "modified" else position
+    first = None
+    if rotation is not None:
+        E = C.T @ rotation @ rotation[0].T @ C
+        angles = smoothing.low_pass(rotations.to_euler_continuous(E), rate, cutoff)
+        E = rotations.from_euler(angles)
+        # Smoothing moves the first sample too; R(0) takes that in, so that E begins with no turn.
+        first = C @ E[0] @ C.T @ rotation[0]
+        x[:, 3:] = rotations.to_euler_continuous(E @ E[0].T)
+    removed = np.sum((position - even.position[part]) ** 2, axis=1)
+    return Prepared(
+        Stroke(t, position, rotation),
+        smoothing.differentiated(t, x),
+        TaskFrame(position[0], position[-1], axes, first),
+        plane.is_closed(position),
+        float(np.sqrt(np.mean(removed))),
+        (float(even.t[part][0]), float(even.t[-1] - even.t[part][-1])),
+        cutoff,
+    )
+
+
+def check_alike(prepared: Sequence[Prepared]) -> None:
+    """Refuse to mix open and closed strokes, or strokes with and without orientation.
+
+    Raises
+    ------
+    InputError
+    """
+    first = prepared[0]
+    for i, other in enumerate(prepared[1:], start=2):
+        if other.closed != first.closed:
+            kinds = {True: "closed", False: "open"}
+            raise InputError(
+                f"demonstration {i} is {kinds[other.closed]}, the first is {kinds[first.closed]}; "
+                "fit them apart"
+            )
+        if (other.frame.rotation is None) != (first.frame.rotation is None):
+            raise InputError(
+                f"demonstration {i} and the first: only one has an orientation; fit them apart"
+            )

@@ -1,0 +1,142 @@
+"""From a recording to a stroke that can be learned: even time, no idle ends, no noise.
+
+The zero-phase low-pass and the spline are scipy's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.arrays import Floats
+
+# A sample moves when it is faster than this part of the stroke's peak speed ...
+REST_SPEED = 0.01
+# ... and this part of the moving time is kept before and after, so that a soft start stays whole.
+IDLE_MARGIN = 0.05
+# Recordings are evenly sampled when no step differs from the median by more than this part of it.
+_EVEN = 1e-4
+_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """What the tool did: time from 0, positions and, where known, rotations.
+
+    Attributes
+    ----------
+    t : array, shape (T,)
+        s.
+    position : array, shape (T, 3)
+        mm, base frame.
+    rotation : array, shape (T, 3, 3), or None
+    """
+
+    t: Floats
+    position: Floats
+    rotation: Floats | None = None
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last sample."""
+        return float(self.t[-1] - self.t[0])
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Smoothed samples and their derivatives by time.
+
+    Attributes
+    ----------
+    x, velocity, acceleration : array, shape (T, D)
+    """
+
+    x: Floats
+    velocity: Floats
+    acceleration: Floats
+
+
+def evenly_sampled(stroke: Stroke) -> Stroke:
+    """Return the stroke on an even time grid from 0, at its median rate.
+
+    Positions follow a cubic spline, rotations the shortest arc.
+    """
+    t = stroke.t - stroke.t[0]
+    steps = np.diff(t)
+    step = float(np.median(steps))
+    if np.max(np.abs(steps - step)) <= _EVEN * step:
+        # Spread rounding of the time stamps over the grid instead of leaving it in the derivatives.
+        return Stroke(np.linspace(0.0, t[-1], len(t)), stroke.position, stroke.rotation)
+    from scipy.interpolate import CubicSpline
+
+    even = np.linspace(0.0, t[-1], round(float(t[-1]) / step) + 1)
+    rotation = None if stroke.rotation is None else rotations.interpolate(t, stroke.rotation, even)
+    return Stroke(even, CubicSpline(t, stroke.position)(even), rotation)
+
+
+def low_pass(x: Floats, rate: float, cutoff: float | None) -> Floats:
+    """Zero-phase Butterworth low-pass of order 4, forward and backward.
+
+    Parameters
+    ----------
+    x : array, shape (T, D)
+    rate : float
+        Hz.
+    cutoff : float or None
+        Hz, where the gain is one half; None, or half the rate and above, leaves x as it is.
+
+    Returns
+    -------
+    array, shape (T, D)
+    """
+    if cutoff is None or cutoff >= 0.5 * rate:
+        return x
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
+    # The longest settling time that the recording allows keeps its ends where they are.
+    settling = int(np.ceil(3.0 * rate / cutoff))
+    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 1, settling)))
+
+
+def differentiated(t: Floats, x: Floats) -> Signal:
+    """Velocity and acceleration of even samples, from the quintic spline through them.
+
+    Parameters
+    ----------
+    t : array, shape (T,)
+    x : array, shape (T, D)
+
+    Returns
+    -------
+    Signal
+    """
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(t, x, k=5)
+    return Signal(x, spline(t, 1), spline(t, 2))
+
+
+def moving_part(t: Floats, position: Floats) -> slice:
+    """Samples between the idle ends.
+
+    Parameters
+    ----------
+    t : array, shape (T,)
+        Even, s.
+    position : array, shape (T, 3)
+        Smoothed, mm.
+
+    Returns
+    -------
+    slice
+        From `IDLE_MARGIN` before the first sample faster than `REST_SPEED` of the peak to as much
+        after the last; everything when nothing moves.
+    """
+    speed = np.linalg.norm(np.gradient(position, t, axis=0), axis=1)
+    moving = np.flatnonzero(speed > REST_SPEED * speed.max())
+    if len(moving) == 0:
+        return slice(0, len(t))
+    first, last = int(moving[0]), int(moving[-1])
+    margin = int(np.ceil(IDLE_MARGIN * (last - first)))
+    return slice(max(0, first - margin), min(len(t), last + 1 + margin))

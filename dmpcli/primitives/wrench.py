@@ -1,0 +1,149 @@
+"""The wrench on the tool between the sensor and the TCP, and the wrench of the tool's own weight.
+
+Forces in N, torques in N·m, lengths in mm. A wrench is one array: force first, then torque. All
+wrenches act on the tool.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.rotations import skew
+
+METRE = 1000.0
+"""Millimetres: a lever in mm times a force in N is METRE times a torque in N·m."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Where TCP and sensor sit on the flange, and what hangs on the sensor.
+
+    Attributes
+    ----------
+    tcp_position, tcp_rotation : array, shape (3,) and (3, 3)
+        Flange → TCP, mm.
+    sensor_position, sensor_rotation : array, shape (3,) and (3, 3)
+        Flange → sensor, mm.
+    weight : float
+        Of everything on the sensor's tool side, N.
+    centre : array, shape (3,)
+        Its centre of mass, from the sensor's origin, sensor axes, mm.
+    inclination : array, shape (2,)
+        Angles U and V of the robot's base against the vertical, rad; see `gravity`.
+    zero : array, shape (6,), optional
+        What the sensor reads with nothing on it, N and N·m; None where it is not known.
+    """
+
+    tcp_position: Floats
+    tcp_rotation: Floats
+    sensor_position: Floats
+    sensor_rotation: Floats
+    weight: float
+    centre: Floats
+    inclination: Floats = field(default_factory=lambda: np.zeros(2))
+    zero: Floats | None = None
+
+    @property
+    def sensor_in_tcp(self) -> Floats:
+        """Rotation TCP ← sensor, shape (3, 3): ``R_base←sensor = R_base←TCP @ sensor_in_tcp``."""
+        return self.tcp_rotation.T @ self.sensor_rotation
+
+    @property
+    def lever(self) -> Floats:
+        """From the sensor's origin to the TCP, sensor axes, shape (3,), mm."""
+        return self.sensor_rotation.T @ (self.tcp_position - self.sensor_position)
+
+    def with_zero(self, zero: Floats | None) -> "Tool":
+        """Return the same tool with another zero, shape (6,)."""
+        return replace(self, zero=zero)
+
+
+def gravity(weight: float, inclination: Floats) -> Floats:
+    """Weight as a vector in base axes, for a robot whose base is inclined.
+
+    ``L = G [cos U sin V, -sin U, -cos U cos V]``: U = V = 0 is a base that stands upright.
+
+    Parameters
+    ----------
+    weight : float
+        N.
+    inclination : array, shape (2,)
+        U, V in rad.
+
+    Returns
+    -------
+    array, shape (3,)
+        N.
+    """
+    u, v = inclination
+    return weight * np.array([np.cos(u) * np.sin(v), -np.sin(u), -np.cos(u) * np.cos(v)])
+
+
+def of_weight(R: Floats, load: Floats, centre: Floats) -> Floats:
+    """Wrench of the tool's own weight, as the sensor feels it.
+
+    ``F = Rᵀ L``, ``M = c × F``.
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+        Base ← sensor.
+    load : array, shape (3,)
+        Weight as a vector, base axes, N.
+    centre : array, shape (3,)
+        Centre of mass from the sensor's origin, sensor axes, mm.
+
+    Returns
+    -------
+    array, shape (..., 6)
+        Sensor axes, about the sensor's origin.
+    """
+    force = np.matvec(np.swapaxes(R, -1, -2), load)
+    return np.concatenate([force, np.matvec(skew(centre) / METRE, force)], axis=-1)
+
+
+def to_tcp(wrench: Floats, R: Floats, lever: Floats) -> Floats:
+    """Move a wrench from the sensor to the TCP, and into base axes.
+
+    ``F = R F_s``, ``M = R (M_s - r × F_s)``.
+
+    Parameters
+    ----------
+    wrench : array, shape (..., 6)
+        Sensor axes, about the sensor's origin.
+    R : array, shape (..., 3, 3)
+        Base ← sensor.
+    lever : array, shape (3,)
+        r, from the sensor's origin to the TCP, sensor axes, mm.
+
+    Returns
+    -------
+    array, shape (..., 6)
+        Base axes, about the TCP.
+    """
+    force, torque = wrench[..., :3], wrench[..., 3:]
+    torque = torque - np.matvec(skew(lever) / METRE, force)
+    return np.concatenate([np.matvec(R, force), np.matvec(R, torque)], axis=-1)
+
+
+def to_sensor(wrench: Floats, R: Floats, lever: Floats) -> Floats:
+    """Move a wrench from the TCP and base axes to the sensor; undoes `to_tcp`.
+
+    Parameters
+    ----------
+    wrench : array, shape (..., 6)
+        Base axes, about the TCP.
+    R : array, shape (..., 3, 3)
+        Base ← sensor.
+    lever : array, shape (3,)
+        r, from the sensor's origin to the TCP, sensor axes, mm.
+
+    Returns
+    -------
+    array, shape (..., 6)
+        Sensor axes, about the sensor's origin.
+    """
+    back = np.swapaxes(R, -1, -2)
+    force, torque = np.matvec(back, wrench[..., :3]), np.matvec(back, wrench[..., 3:])
+    return np.concatenate([force, torque + np.matvec(skew(lever) / METRE, force)], axis=-1)

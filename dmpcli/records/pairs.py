@@ -1,0 +1,129 @@
+"""Start-goal pairs from CSV or Parquet: every row is kept, bad ones with what is wrong."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.arrays import Booleans, Floats
+from dmpcli.errors import InputError
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.records import tables
+from dmpcli.records.streams import Source
+from dmpcli.records.tables import Table
+
+START = ("x0", "y0", "z0")
+GOAL = ("xg", "yg", "zg")
+START_ANGLES = ("rx0", "ry0", "rz0")
+GOAL_ANGLES = ("rxg", "ryg", "rzg")
+OK = "ok"
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """A table of pairs as read.
+
+    Attributes
+    ----------
+    name : str
+    ids : array of str, shape (B,)
+        Of the ``id`` column, else the row numbers from 1.
+    pairs : Pairs
+        B pairs; rows whose status is not ``ok`` hold NaN or what they held.
+    duration : array, shape (B,)
+        s; NaN where the table does not say.
+    status : array of str, shape (B,)
+        ``ok``, or what is wrong with the row, with its place in the file.
+    """
+
+    name: str
+    ids: list[str]
+    pairs: Pairs
+    duration: Floats
+    status: list[str]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def good(self) -> Booleans:
+        """Rows whose status is ``ok``, shape (B,)."""
+        return np.array([status == OK for status in self.status], dtype=bool)
+
+
+def read(source: Source) -> PairTable:
+    """Read a table with the columns ``x0 y0 z0 xg yg zg`` and what else it has.
+
+    Optional are ``id``, ``duration`` (s) and the orientations ``rx0 ry0 rz0``, ``rxg ryg rzg``
+    (X-Y-Z Euler angles, rad).
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, holds no rows, lacks a column, or two rows have one id.
+    """
+    table = tables.read(source)
+    status = [OK] * len(table)
+    start, goal = _three(table, START, status), _three(table, GOAL, status)
+    duration = np.full(len(table), np.nan)
+    if "duration" in table.columns:
+        duration = table.floats("duration")
+        bad = ~table.empty("duration") & ~(np.isfinite(duration) & (duration > 0))
+        _mark(table, status, bad, "duration", "is not a positive time in s")
+    return PairTable(
+        source.name,
+        _ids(table),
+        Pairs(
+            start,
+            goal,
+            _rotations(table, START_ANGLES, status),
+            _rotations(table, GOAL_ANGLES, status),
+        ),
+        duration,
+        status,
+    )
+
+
+def _three(table: Table, names: tuple[str, ...], status: list[str]) -> Floats:
+    return np.stack([_column(table, name, status) for name in names], axis=1)
+
+
+def _column(table: Table, name: str, status: list[str]) -> Floats:
+    values = table.floats(name)
+    _mark(table, status, ~np.isfinite(values), name, "is not a finite number")
+    return values
+
+
+def _mark(table: Table, status: list[str], bad: Booleans, name: str, what: str) -> None:
+    for row in np.flatnonzero(bad):
+        if status[row] == OK:
+            shown = table.shown(name, int(row))
+            status[row] = f"{table.at(int(row))}, column {name!r}: {shown} {what}"
+
+
+def _rotations(table: Table, names: tuple[str, ...], status: list[str]) -> Floats | None:
+    present = [name in table.columns for name in names]
+    if not any(present):
+        return None
+    if not all(present):
+        missing = names[present.index(False)]
+        raise InputError(
+            f"{table.name}: column {missing!r} is missing; an orientation needs all of "
+            f"{', '.join(names)}"
+        )
+    return rotations.from_euler(_three(table, names, status))
+
+
+def _ids(table: Table) -> list[str]:
+    if "id" not in table.columns:
+        return [str(row + 1) for row in range(len(table))]
+    ids = [str(value) for value in table.columns["id"]]
+    seen: dict[str, int] = {}
+    for row, name in enumerate(ids):
+        if name in seen:
+            raise InputError(
+                f"{table.name}: column 'id', {table.at(row)}: {name!r} is also in "
+                f"{table.at(seen[name])}; ids must differ"
+            )
+        seen[name] = row
+    return ids

@@ -1,0 +1,243 @@
+"""The skill file: one JSON document, human-readable, diff-able, exact.
+
+Its JSON Schema is published in the package, ``json_schemas/skill.schema.json``.
+"""
+
+import json
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from dmpcli import rotations
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.primitives.dynamics import Spring
+from dmpcli.primitives.phase import Basis
+from dmpcli.primitives.skill import Skill, TaskFrame
+from dmpcli.records.record import Provenance
+from dmpcli.records.schemas import EULER, FRAME
+from dmpcli.records.streams import Source
+
+SCHEMA: Literal["skill"] = "skill"
+VERSION = 1
+
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0)]
+Weights = Annotated[list[float], Field(min_length=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_by_name=True,
+        validate_by_alias=True,
+    )
+
+
+class Frame(_Part):
+    """Where and how the stroke was demonstrated, in the base frame."""
+
+    start: Annotated[Three, Field(description="mm")]
+    goal: Annotated[Three, Field(description="mm")]
+    length: Annotated[float, Field(ge=0, description="distance from start to goal, mm")]
+    axes: Annotated[
+        list[Three],
+        Field(min_length=3, max_length=3, description="rows of C_d; its columns are e_u, e_v, n"),
+    ]
+    rotation: Annotated[
+        Three | None, Field(description="R(0) as X-Y-Z Euler angles, rad; null when unknown")
+    ]
+
+
+class Reproduction(_Part):
+    """How well the skill gives back one demonstration, in mm."""
+
+    sha256: str
+    duration: Annotated[Positive, Field(description="after trimming, s")]
+    rms: Annotated[float, Field(ge=0, description="deviation at equal times")]
+    largest: Annotated[float, Field(ge=0)]
+    end: Annotated[float, Field(ge=0, description="deviation at the last sample")]
+    smoothing: Annotated[float, Field(ge=0, description="RMS of what smoothing took off")]
+
+
+class SkillFile(_Part):
+    """A dynamic movement primitive of six coordinates, learned by dmpcli fit."""
+
+    schema_name: Annotated[Literal["skill"], Field(alias="schema")] = SCHEMA
+    version: Annotated[int, Field(ge=1)] = VERSION
+    tool: str
+    frame_convention: str = FRAME
+    euler_convention: str = EULER
+    model: Literal["modified", "original"]
+    forcing_scale: Literal["axis", "distance"] | None
+    closed: bool
+    duration: Annotated[Positive, Field(description="T_d, s")]
+    tau: Annotated[Positive, Field(description="s")]
+    alpha_1: Positive
+    k: Annotated[Six, Field(description="spring constants")]
+    d: Annotated[Six, Field(description="damping")]
+    alpha_f: Six
+    alpha_e: Six
+    start: Annotated[Six, Field(description="x0 in the skill's coordinates, mm and rad")]
+    goal: Annotated[Six, Field(description="g in the skill's coordinates, mm and rad")]
+    initial_velocity: Annotated[Six, Field(description="V0 = tau dx/dt(0), mm and rad")]
+    forcing_factor: Annotated[Six, Field(description="factor beside s in eq. (7)")]
+    exempt: Annotated[list[bool], Field(min_length=6, max_length=6)]
+    task_frame: Frame
+    basis: Annotated[int, Field(ge=1, description="N")]
+    centres: Weights
+    widths: Weights
+    weights: Annotated[list[Weights], Field(min_length=6, max_length=6, description="6 x N")]
+    reproduction: Annotated[list[Reproduction], Field(min_length=1)]
+    options: dict[str, Any]
+    inputs: list[dict[str, str]]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "SkillFile":
+        lengths = {len(self.centres), len(self.widths), *(len(row) for row in self.weights)}
+        if lengths != {self.basis}:
+            raise ValueError(f"centres, widths and weights must each have basis = {self.basis}")
+        if min(self.k) <= 0 or min(self.d) <= 0 or min(self.widths) <= 0:
+            raise ValueError("k, d and widths must be positive")
+        C = np.array(self.task_frame.axes)
+        if np.abs(C.T @ C - np.eye(3)).max() > 1e-6 or np.linalg.det(C) < 0:
+            raise ValueError("task_frame.axes is not a right-handed rotation")
+        if 0.0 in self.forcing_factor:
+            raise ValueError("forcing_factor must not hold 0")
+        return self
+
+
+def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenance) -> bytes:
+    """Return a skill as the bytes of its JSON file; floats round-trip exactly."""
+    frame = skill.frame
+    rotation = None if frame.rotation is None else rotations.to_euler(frame.rotation).tolist()
+    document = SkillFile(
+        schema_name=SCHEMA,
+        tool=provenance.tool,
+        model=skill.model,
+        forcing_scale=skill.forcing_scale,
+        closed=skill.closed,
+        duration=skill.duration,
+        tau=skill.spring.tau,
+        alpha_1=skill.alpha_1,
+        k=skill.spring.k.tolist(),
+        d=skill.spring.d.tolist(),
+        alpha_f=skill.alpha_f.tolist(),
+        alpha_e=skill.alpha_e.tolist(),
+        start=skill.start.tolist(),
+        goal=skill.goal.tolist(),
+        initial_velocity=skill.initial_velocity.tolist(),
+        forcing_factor=skill.forcing_factor.tolist(),
+        exempt=skill.exempt.tolist(),
+        task_frame=Frame(
+            start=frame.start.tolist(),
+            goal=frame.goal.tolist(),
+            length=frame.length,
+            axes=frame.axes.tolist(),
+            rotation=rotation,
+        ),
+        basis=len(skill.basis),
+        centres=skill.basis.centres.tolist(),
+        widths=skill.basis.widths.tolist(),
+        weights=skill.weights.tolist(),
+        reproduction=reproduction,
+        options=provenance.options,
+        inputs=list(provenance.inputs),
+    )
+    return (_layout(document.model_dump(mode="json", by_alias=True)) + "\n").encode()
+
+
+def decode(source: Source) -> tuple[Skill, SkillFile]:
+    """Read a skill file.
+
+    Raises
+    ------
+    InputError
+        Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
+    """
+    document = json_document(source)
+    if document.get("schema") != SCHEMA:
+        raise InputError(
+            f"{source.name}: has schema {document.get('schema')!r}, a skill of dmpcli fit is needed"
+        )
+    version = document.get("version")
+    if isinstance(version, int) and version > VERSION:
+        raise InputError(
+            f"{source.name}: skill version {version} is newer than this program's ({VERSION}); "
+            "upgrade dmpcli"
+        )
+    try:
+        file = SkillFile.model_validate(document)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"]) or "document"
+        raise InputError(f"{source.name}: {where}: {detail['msg']}; fit the skill again") from None
+    return _skill(file), file
+
+
+def json_document(source: Source) -> dict[str, Any]:
+    """Return the object of a JSON source; InputError where it is not JSON or not an object."""
+    try:
+        document = json.loads(source.content)
+    except (ValueError, RecursionError) as error:
+        reason = str(error) if isinstance(error, json.JSONDecodeError) else "not text"
+        raise InputError(f"{source.name}: is not JSON: {reason}") from None
+    if not isinstance(document, dict):
+        raise InputError(f"{source.name}: is JSON, but not an object")
+    return document
+
+
+def _skill(file: SkillFile) -> Skill:
+    def array(values: Any) -> Floats:
+        return np.array(values, dtype=float)
+
+    frame = file.task_frame
+    return Skill(
+        model=file.model,
+        forcing_scale=file.forcing_scale,
+        spring=Spring(array(file.k), array(file.d), file.tau),
+        alpha_1=file.alpha_1,
+        basis=Basis(array(file.centres), array(file.widths)),
+        weights=array(file.weights),
+        forcing_factor=array(file.forcing_factor),
+        exempt=np.array(file.exempt, dtype=bool),
+        alpha_f=array(file.alpha_f),
+        alpha_e=array(file.alpha_e),
+        start=array(file.start),
+        goal=array(file.goal),
+        initial_velocity=array(file.initial_velocity),
+        duration=file.duration,
+        closed=file.closed,
+        frame=TaskFrame(
+            array(frame.start),
+            array(frame.goal),
+            array(frame.axes),
+            None if frame.rotation is None else rotations.from_euler(array(frame.rotation)),
+        ),
+    )
+
+
+def _layout(value: Any, indent: int = 0) -> str:
+    """JSON with one line per list of numbers: a changed weight is a changed line, not a page."""
+    if isinstance(value, dict) and value:
+        inner = ",\n".join(
+            f"{' ' * (indent + 2)}{json.dumps(key)}: {_layout(item, indent + 2)}"
+            for key, item in value.items()
+        )
+        return "{\n" + inner + "\n" + " " * indent + "}"
+    if isinstance(value, list) and value and isinstance(value[0], list | dict):
+        inner = ",\n".join(" " * (indent + 2) + _layout(item, indent + 2) for item in value)
+        return "[\n" + inner + "\n" + " " * indent + "]"
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of skill files."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "dmpcli skill",
+    } | SkillFile.model_json_schema(by_alias=True)

@@ -1,0 +1,106 @@
+"""Trajectory files: one stroke, or a dataset folder of parts with a status per pair."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.arrays import AnyArray, Floats
+from dmpcli.primitives.drawing import Stroke
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.skill import Skill
+from dmpcli.records import schemas
+from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
+from dmpcli.records.record import Provenance, Record
+from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
+
+
+def facts_of(skill: Skill) -> dict[str, Any]:
+    """Return what `execute` and `report` need of the skill that drew a trajectory."""
+    return {
+        "model": skill.model,
+        "forcing_scale": skill.forcing_scale,
+        "closed": skill.closed,
+        "k": skill.spring.k.tolist(),
+        "d": skill.spring.d.tolist(),
+        "alpha_e": skill.alpha_e.tolist(),
+    }
+
+
+def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) -> dict[str, Any]:
+    """Return what is so for one stroke alone: its tau, ends and plane."""
+    return {
+        "tau": stroke.timing.tau,
+        "duration": float(stroke.timing.t[-1]),
+        "rate": rate,
+        "start": start.tolist(),
+        "goal": goal.tolist(),
+        "normal": stroke.normal.tolist(),
+    }
+
+
+def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenance) -> Record:
+    """Return the record of several strokes, one after the other.
+
+    Parameters
+    ----------
+    ids : sequence of str
+        Of each stroke.
+    strokes : sequence of Stroke
+        At least one; all with orientation or all without.
+    p : Provenance
+    """
+    columns: dict[str, AnyArray] = {
+        "id": np.repeat(np.array(ids, dtype=object), [len(s.timing.t) for s in strokes]),
+        "t": np.concatenate([s.timing.t for s in strokes]),
+    }
+    position = np.concatenate([s.position for s in strokes])
+    columns |= {name: position[:, i] for i, name in enumerate(POSITION)}
+    angles = [s.euler for s in strokes if s.euler is not None]
+    if angles:
+        euler = np.concatenate(angles)
+        columns |= {name: euler[:, i] for i, name in enumerate(EULER_ANGLES)}
+    return Record(schemas.TRAJECTORY, columns, p)
+
+
+def pairs_record(
+    ids: Sequence[str],
+    pairs: Pairs,
+    duration: Floats,
+    normal: Floats,
+    part: Sequence[str],
+    status: Sequence[str],
+    p: Provenance,
+) -> Record:
+    """Return the record that says what became of each pair.
+
+    Parameters
+    ----------
+    ids, part, status : sequence of str, length B
+    pairs : Pairs
+    duration : array, shape (B,)
+        s, as drawn.
+    normal : array, shape (B, 3)
+        NaN for pairs that were not drawn.
+    p : Provenance
+    """
+    columns: dict[str, AnyArray] = {"id": np.array(ids, dtype=object)}
+    groups: list[tuple[Sequence[str], Floats | None]] = [
+        (START, pairs.start),
+        (GOAL, pairs.goal),
+        (START_ANGLES, _angles(pairs.start_rotation)),
+        (GOAL_ANGLES, _angles(pairs.goal_rotation)),
+        (NORMAL, normal),
+    ]
+    for names, values in groups:
+        if values is not None:
+            columns |= {name: values[:, i] for i, name in enumerate(names)}
+    columns["duration"] = duration
+    columns["part"] = np.array(part, dtype=object)
+    columns["status"] = np.array(status, dtype=object)
+    return Record(schemas.PAIRS, columns, p)
+
+
+def _angles(rotation: Floats | None) -> Floats | None:
+    return None if rotation is None else rotations.to_euler(rotation)

@@ -1,0 +1,448 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from dmpcli.cli import app
+from dmpcli.records import record, schemas, streams
+from dmpcli.records.record import Provenance, Record
+
+START = np.array([-551.030, 131.399, -17.560])
+FACTS = {"k": [100.0] * 6, "d": [20.0] * 6, "tau": 5.0, "alpha_e": [5.0] * 6}
+REALTIME = ["--realtime", "--robot", "mock:?lag=0.2"]
+
+
+def minimum_jerk(s):
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def columns(duration=10.0, rate=50.0, name="0", oriented=True):
+    t = np.arange(round(duration * rate) + 1) / rate
+    u = minimum_jerk(t / duration)
+    out = {
+        "id": np.array([name] * len(t), dtype=object),
+        "t": t,
+        "x": START[0] - 109.0 * u,
+        "y": START[1] + 25.0 * np.sin(2 * np.pi * u),
+        "z": START[2] + 0.0 * u,
+    }
+    if oriented:
+        out |= {"rx": np.full(len(t), np.pi), "ry": 0.0 * u, "rz": 0.4 * u}
+    return out
+
+
+def written(path, cols, normal=(0.0, 0.0, 1.0), schema=schemas.TRAJECTORY):
+    facts = FACTS if normal is None else FACTS | {"normal": list(normal)}
+    path.write_bytes(record.encode(Record(schema, cols, Provenance("generalize", {}, (), facts))))
+    return path
+
+
+@pytest.fixture
+def traj(tmp_path):
+    return written(tmp_path / "traj.parquet", columns())
+
+
+def execute(*arguments, expect=0):
+    result = CliRunner().invoke(app, ["execute", *map(str, arguments)])
+    assert result.exit_code == expect, (result.exit_code, result.stderr, result.exception)
+    return result
+
+
+def run_of(path):
+    return record.decode(streams.read(path), schemas.RUN)
+
+
+def refused(*arguments, code, output=None):
+    """Run the command to its error: one or two lines, nothing on stdout, no output touched."""
+    result = execute(*arguments, expect=code)
+    lines = result.stderr.strip().splitlines()
+    assert 1 <= len(lines) <= 2, result.stderr
+    assert lines[0].startswith("dmpcli: ")
+    assert result.stdout == ""
+    if output is not None:
+        assert not output.exists()
+    return lines[-1]
+
+
+def test_a_run_holds_what_was_planned_sent_and_done(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out)
+    run = run_of(out)
+    stroke = run.columns["phase"] == "stroke"
+    planned = record.decode(streams.read(traj)).position()
+    np.testing.assert_array_equal(run.position("plan")[stroke], planned)
+    np.testing.assert_array_equal(run.position("sent")[stroke], planned)
+    assert np.linalg.norm(run.position()[-1] - planned[-1]) < 0.05
+    assert np.linalg.norm(run.position()[stroke] - planned, axis=1).max() > 0.5, "the mock lags"
+    np.testing.assert_allclose(run.columns["t_plan"][stroke], np.arange(501) * 0.02, atol=1e-9)
+    np.testing.assert_allclose(run.columns["rz_plan"][stroke][-1], 0.4)
+    assert set(run.columns["state"]) == {"ready"}
+    assert not run.has("fx")
+    facts = run.provenance.facts
+    assert facts["reason"] == "done"
+    assert (facts["completed"], facts["missed"], facts["simulated"]) == (True, 0, True)
+    assert facts["trajectory"]["tau"] == 5.0
+    assert "lateness" not in facts
+    assert run.provenance.inputs == ({"role": "trajectory", "sha256": streams.read(traj).sha256},)
+
+
+def test_the_same_run_gives_the_same_bytes(traj, tmp_path):
+    for name in ("a", "b"):
+        extra = ("--coupling", "force", "--force-setpoint", 5)
+        execute(traj, "-o", tmp_path / name, *extra)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_standard_input_and_output(traj, tmp_path):
+    command = [sys.executable, "-m", "dmpcli", "execute", "-", "-o", "-"]
+    done = subprocess.run(command, input=traj.read_bytes(), capture_output=True, check=True)
+    piped = tmp_path / "piped.parquet"
+    piped.write_bytes(done.stdout)
+    execute(traj, "-o", tmp_path / "named.parquet")
+    assert piped.read_bytes() == (tmp_path / "named.parquet").read_bytes()
+
+
+def test_half_the_speed_takes_twice_the_time(traj, tmp_path):
+    execute(traj, "-o", tmp_path / "run.parquet", "--speed", 0.5)
+    run = run_of(tmp_path / "run.parquet")
+    assert np.count_nonzero(run.columns["phase"] == "stroke") == 1001
+    assert run.provenance.options["speed"] == 0.5
+
+
+def test_a_missing_orientation_holds_the_arms(tmp_path):
+    traj = written(tmp_path / "traj.parquet", columns(oriented=False))
+    execute(traj, "-o", tmp_path / "run.parquet", "--robot", "mock:?rx=3.0&ry=0.1&rz=-0.5")
+    run = run_of(tmp_path / "run.parquet")
+    assert not run.has("rx_plan")
+    for name, angle in (("rx_sent", 3.0), ("ry_sent", 0.1), ("rz_sent", -0.5)):
+        np.testing.assert_allclose(run.columns[name], angle, atol=1e-9)
+
+
+def test_a_dry_run_shows_the_verdict_and_writes_nothing(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    result = execute(traj, "-o", out, "--dry-run")
+    assert "may be executed" in result.stderr
+    assert "acceleration" in result.stderr
+    assert result.stdout == ""
+    assert not out.exists()
+    result = execute(traj, "--dry-run", "--max-speed", 20, expect=3)
+    assert "TOO MUCH" in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("dmpcli: speed 35.8")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--max-speed", 20), "--max-speed"),
+        (("--max-acceleration", 20), "--max-acceleration"),
+        (("--max-jerk", 20), "--max-jerk"),
+        (("--max-rotation-speed", 0.05), "--max-rotation-speed"),
+        (("--max-rotation-acceleration", 0.02), "--max-rotation-acceleration"),
+        (("--max-rotation-jerk", 0.02), "--max-rotation-jerk"),
+        (("--workspace", -600, 0, 0, 300, -50, 50), "workspace in x"),
+        (("--robot", "mock:?x=-540"), "--approach"),
+        (("--robot", "mock:?rz=0.1"), "--approach"),
+        (("--robot", "mock:?estop_at=0"), "emergency stop"),
+    ],
+)
+def test_what_breaks_a_limit_is_refused_before_anything_moves(traj, tmp_path, options, words):
+    out = tmp_path / "run.parquet"
+    assert words in refused(traj, "-o", out, *options, code=3, output=out)
+
+
+@pytest.mark.parametrize(("rows", "remedy"), [((150, 501), "--ease-in"), ((0, 300), "--ease-out")])
+def test_a_stroke_in_motion_at_an_end_is_refused(tmp_path, rows, remedy):
+    cut = {name: column[slice(*rows)] for name, column in columns().items()}
+    traj = written(tmp_path / "traj.parquet", cut)
+    out = tmp_path / "run.parquet"
+    assert remedy in refused(traj, "-o", out, code=3, output=out)
+
+
+def test_an_approach_leads_to_the_start(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out, "--robot", "mock:?x=-520&rz=0.1", "--approach", 30)
+    run = run_of(out)
+    phases = list(dict.fromkeys(run.columns["phase"]))
+    assert phases == ["approach", "stroke", "stop"]
+    speed = np.linalg.norm(np.diff(run.position("sent"), axis=0), axis=1) / 0.02
+    approach = run.columns["phase"][1:] == "approach"
+    assert speed[approach].max() <= 30.0 + 1e-6
+
+
+def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out, "--robot", "mock:?x=-550&y=132")
+    sent = run_of(out).position("sent")
+    np.testing.assert_allclose(sent[0], [-550.0, 132.0, -17.56], atol=1e-9)
+    assert np.linalg.norm(np.diff(sent, 2, axis=0), axis=1).max() / 0.02**2 < 2250.0
+
+
+# --- bad input: exit code 2, named, nothing touched
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--speed", 0), "--speed = 0"),
+        (("--speed", "nan"), "--speed"),
+        (("--period", -0.02), "--period"),
+        (("--period", 1.0), "--period 1"),
+        (("--max-jerk", "inf"), "--max-jerk"),
+        (("--workspace", 0, -1, 0, 1, 0, 1), "workspace"),
+        (("--robot", "elite://10.0.0.1"), "elite"),
+        (("--robot", "nonsense"), "nonsense"),
+        (("--force-setpoint", 5), "--coupling force"),
+        (("--coupling", "force"), "--force-setpoint"),
+        (("--id", "7"), "the id 7"),
+        (("--preset", "nothing"), "nothing"),
+        (("--tool", "missing.json"), "missing.json"),
+    ],
+)
+def test_a_wrong_option_is_named(traj, tmp_path, options, words):
+    out = tmp_path / "run.parquet"
+    assert words in refused(traj, "-o", out, *options, code=2, output=out)
+
+
+def test_an_output_is_needed_for_more_than_a_dry_run(traj):
+    assert "--dry-run" in refused(traj, code=2)
+
+
+def test_an_unstable_coupling_is_refused_by_name(traj, tmp_path):
+    config = tmp_path / "c.toml"
+    config.write_text("[execute]\ncoupling_mass = 0.01\n")
+    options = ("--coupling", "force", "--force-setpoint", 5, "--config", config)
+    out = tmp_path / "run.parquet"
+    assert "unstable" in refused(traj, "-o", out, *options, code=2, output=out)
+
+
+def test_a_plane_is_needed_to_press_on(tmp_path):
+    traj = written(tmp_path / "traj.parquet", columns(), normal=None)
+    options = ("--coupling", "force", "--force-setpoint", 5)
+    out = tmp_path / "run.parquet"
+    assert "normal" in refused(traj, "-o", out, *options, code=2, output=out)
+
+
+def changed(name, row, value):
+    cols = columns()
+    cols[name] = cols[name].copy()
+    cols[name][row] = value
+    return cols
+
+
+@pytest.mark.parametrize(
+    ("cols", "words"),
+    [
+        (changed("t", 100, 1.0), "column 't', row 101"),
+        (changed("t", 100, 1.98), "column 't', row 101"),
+        (changed("ry", 7, np.nan), "column 'ry', row 8"),
+        ({k: v[:1] for k, v in columns().items()}, "one row"),
+    ],
+    ids=["backward", "repeated", "half an orientation", "one row"],
+)
+def test_a_broken_file_names_column_and_row(tmp_path, cols, words):
+    traj = written(tmp_path / "traj.parquet", cols)
+    out = tmp_path / "run.parquet"
+    line = refused(traj, "-o", out, code=2, output=out)
+    assert words in line
+    assert "traj.parquet" in line
+
+
+def test_a_file_of_another_schema_is_refused(tmp_path):
+    cols = {k: v for k, v in columns().items() if k != "id"}
+    other = written(tmp_path / "demo.parquet", cols, schema=schemas.DEMONSTRATION)
+    assert "trajectory file is needed" in refused(other, "-o", tmp_path / "r.parquet", code=2)
+
+
+def test_several_strokes_need_an_id(tmp_path):
+    first, second = columns(name="a"), columns(duration=5.0, name="b")
+    traj = written(
+        tmp_path / "traj.parquet", {k: np.concatenate([first[k], second[k]]) for k in first}
+    )
+    out = tmp_path / "run.parquet"
+    line = refused(traj, "-o", out, code=2, output=out)
+    assert "2 strokes" in line
+    assert "--id (a, b)" in line
+    execute(traj, "-o", out, "--id", "b")
+    assert np.count_nonzero(run_of(out).columns["phase"] == "stroke") == 251
+    assert run_of(out).provenance.options["id"] == "b"
+
+
+@pytest.fixture
+def batch(tmp_path):
+    folder = tmp_path / "batch"
+    folder.mkdir()
+    first, second = columns(name="a"), columns(duration=5.0, name="b")
+    both = {k: np.concatenate([first[k], second[k]]) for k in first}
+    written(folder / "part-0.parquet", both, normal=None)
+    pairs = {
+        "id": np.array(["a", "b", "c"], dtype=object),
+        "duration": np.array([10.0, 5.0, 5.0]),
+        "part": np.array(["part-0.parquet", "part-0.parquet", ""], dtype=object),
+        "status": np.array(["ok", "ok", "start is 3 mm off the plane"], dtype=object),
+        "nx": np.zeros(3),
+        "ny": np.zeros(3),
+        "nz": np.ones(3),
+    }
+    ends = {"0": START, "g": START - np.array([109.0, 0.0, 0.0])}
+    pairs |= {a + e: np.full(3, p[i]) for e, p in ends.items() for i, a in enumerate("xyz")}
+    written(folder / "pairs.parquet", pairs, schema=schemas.PAIRS)
+    return folder
+
+
+def test_one_stroke_of_a_batch_is_picked_by_id(batch, tmp_path):
+    out = tmp_path / "run.parquet"
+    assert "--id (a, b)" in refused(batch, "-o", out, code=2, output=out)
+    assert "3 mm off the plane" in refused(batch, "-o", out, "--id", "c", code=2, output=out)
+    execute(batch, "-o", out, "--id", "b", "--coupling", "force", "--force-setpoint", 4)
+    assert run_of(out).provenance.facts["trajectory"]["normal"] == [0.0, 0.0, 1.0]
+
+
+# --- while it runs
+
+
+@pytest.mark.parametrize(
+    ("robot", "code", "words"),
+    [
+        ("mock:?estop_at=3", 3, "emergency stop"),
+        ("mock:?refuse_at=3", 4, "refused a set-point"),
+        ("mock:?speed=10", 3, "following error"),
+    ],
+)
+def test_a_fault_stops_the_run_and_keeps_its_rows(traj, tmp_path, robot, code, words):
+    out = tmp_path / "run.parquet"
+    result = execute(traj, "-o", out, "--robot", robot, expect=code)
+    assert words in result.stderr.splitlines()[-1]
+    run = run_of(out)
+    assert 50 < len(run) < 400
+    assert words in run.provenance.facts["reason"]
+    assert not run.provenance.facts["completed"]
+
+
+def test_a_sensor_that_falls_silent_stops_the_run(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    result = execute(traj, "-o", out, "--sensor", "mock:?silent_at=3", expect=4)
+    assert "silent" in result.stderr
+    assert 2.8 < run_of(out).t[-1] < 3.2
+
+
+def test_a_force_over_the_limit_stops_the_run(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    options = ("--sensor", "mock:?plate=-15", "--max-force", 10)
+    result = execute(traj, "-o", out, *options, expect=3)
+    assert "force 1" in result.stderr
+    assert len(run_of(out)) == 1
+
+
+def test_a_sensor_is_logged_compensated(traj, tmp_path):
+    """The plate pushes back up with 5 N/mm times 1 mm; tool weight and zero are gone."""
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out, "--sensor", "mock:?plate=-16.56")
+    assert run_of(out).columns["fz"].mean() == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("height", [-18.56, -17.56, -16.56])
+def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tmp_path, height):
+    out = tmp_path / "run.parquet"
+    options = ("--coupling", "force", "--force-setpoint", 5, "--robot", f"mock:?plate={height}")
+    execute(traj, "-o", out, *options)
+    run = run_of(out)
+    stroke = run.columns["phase"] == "stroke"
+    force = run.columns["fz"][stroke]
+    assert np.sqrt(np.mean((force - 5.0) ** 2)) < 0.15
+    assert force.min() > 4.0
+    depth = height - run.columns["z"][stroke]
+    assert depth[-100:].mean() == pytest.approx(1.0, abs=0.02), "5 N on 5 N/mm"
+    gains = run.provenance.facts["coupling"]
+    assert gains["k"] == pytest.approx(gains["d"] ** 2 / 4)
+    assert gains["alpha_e"] == pytest.approx(gains["k"] / gains["d"])
+    assert gains["tau"] == 5.0
+
+
+def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    options = ("--coupling", "force", "--force-setpoint", 5, "--robot", "mock:?plate=none")
+    result = execute(traj, "-o", out, *options, expect=3)
+    assert "no contact within 5 mm" in result.stderr
+    run = run_of(out)
+    assert set(run.columns["phase"]) == {"approach"}
+    assert run.columns["coupling"].min() == -5.0
+
+
+# --- signals and real time, in a process of its own
+
+
+def started(*arguments):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dmpcli", "execute", *map(str, arguments)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    assert "streaming" in process.stderr.readline()
+    return process
+
+
+def after(process, seconds, number):
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(seconds)
+    process.send_signal(number)
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_decelerates_and_keeps_the_run(traj, tmp_path, number, code):
+    out = tmp_path / "run.parquet"
+    process = started(traj, "-o", out, *REALTIME)
+    after(process, 1.6, number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == code, errors
+    assert "decelerated along the path" in errors.splitlines()[-1]
+    run = run_of(out)
+    assert run.columns["phase"][-1] == "stop"
+    assert "stroke" in run.columns["phase"]
+    assert 0.5 < run.columns["t_plan"][-1] < 9.0
+    sent = run.position("sent")
+    last = np.linalg.norm(np.diff(run.position()[-3:], axis=0), axis=1) / np.diff(run.t[-3:])
+    assert last.max() < 1.0, "at rest"
+    u = minimum_jerk(run.columns["t_plan"] / 10.0)
+    on_path = np.abs(sent[:, 0] - (START[0] - 109.0 * u))
+    assert on_path.max() < 0.01
+    assert run.provenance.facts["lateness"]["p50"] < 0.02
+    assert not run.provenance.facts["completed"]
+
+
+def test_a_second_ctrl_c_stops_at_once(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    process = started(traj, "-o", out, *REALTIME)
+    after(process, 1.6, signal.SIGINT)
+    after(process, 0.1, signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130, errors
+    assert "second signal" in errors.splitlines()[-1]
+    run = run_of(out)
+    assert "second signal" in run.provenance.facts["reason"]
+    assert len(run) > 50
+
+
+def test_the_command_line_loads_no_heavy_library():
+    code = (
+        "import sys, json; import dmpcli.commands.execute; heavy = {'numpy', 'scipy', 'pandas',"
+        " 'pyarrow', 'rich', 'matplotlib'}; print(json.dumps(sorted(heavy & set(sys.modules))))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert json.loads(done.stdout) == []
+
+
+def test_running_loads_no_scipy(traj, tmp_path):
+    code = (
+        "import sys; from dmpcli.cli import app;"
+        f"app(['execute', {str(traj)!r}, '-o', {str(tmp_path / 'r.parquet')!r}],"
+        " standalone_mode=False);"
+        "print([m for m in ('scipy', 'matplotlib', 'rich') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert done.stdout.decode().strip() == "[]"

@@ -1,0 +1,136 @@
+"""``dmpcli inspect`` through the real command line: ours, damaged, and from elsewhere."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+from dmpcli.cli import app
+from tests.figures.example_files import demonstration, paper_files, put, trajectory, wave
+
+
+def dmpcli(*words, stdin=None):
+    return CliRunner().invoke(app, ["inspect", *map(str, words)], input=stdin)
+
+
+def found(*words, stdin=None):
+    result = dmpcli(*words, "--json", stdin=stdin)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)["found"]
+
+
+def test_our_files_tell_schema_columns_units_ranges_and_provenance(tmp_path):
+    told = found(put(tmp_path, "demo", demonstration()))
+    assert (told["schema"], told["version"], told["rows"]) == ("demonstration", 1, 501)
+    assert told["duration"] == pytest.approx(10.0)
+    assert told["rate"] == pytest.approx(50.0)
+    columns = {column["name"]: column for column in told["columns"]}
+    assert columns["x"]["unit"] == "mm"
+    assert columns["x"]["least"] == pytest.approx(-660.021)
+    assert columns["x"]["largest"] == pytest.approx(-551.03)
+    assert told["provenance"]["command"] == "record"
+    assert told["provenance"]["facts"] == {"simulated": True}
+
+
+@pytest.mark.parametrize("name", ["demo", "modified", "drawn"])
+def test_every_kind_of_record_is_described_in_a_hundred_columns(tmp_path, name):
+    result = dmpcli(paper_files(tmp_path)[name])
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 100
+    for word in ("version 1", "sha256", "unit", "50 Hz"):
+        assert word in result.stdout
+
+
+def test_several_strokes_in_a_file_are_counted(tmp_path):
+    path = put(tmp_path, "two", trajectory(np.vstack([wave(), wave()]), ids=["a", "b"]))
+    assert found(path)["strokes"] == 2
+    assert "2 strokes" in dmpcli(path).stdout
+
+
+def test_standard_input_is_read(tmp_path):
+    with open(put(tmp_path, "demo", demonstration()), "rb") as stream:
+        assert found("-", stdin=stream.read())["schema"] == "demonstration"
+
+
+def test_presets_tell_their_sections_and_units():
+    from dmpcli.records import settings
+
+    folder = settings.resources.files("dmpcli") / "presets"
+    told = found(folder / "paper.toml")
+    assert told["schema"] == "preset"
+    assert told["content"]["[units] length"] == "mm"
+    assert told["content"]["[fit] basis"] == 80
+
+
+def test_planes_and_reports_are_known_by_content(tmp_path):
+    plane = tmp_path / "a.json"
+    plane.write_text('{"schema": "plane", "version": 1, "point": [0, 0, 1], "normal": [0, 0, 1]}')
+    told = found(plane)
+    assert told["ours"]
+    assert told["content"] == {"point": [0, 0, 1], "normal": [0, 0, 1]}
+    plane.write_text('{"colour": "red"}')
+    assert not found(plane)["ours"]
+
+
+def test_a_foreign_table_tells_how_fit_could_read_it(tmp_path):
+    log = tmp_path / "ur.csv"
+    header = "timestamp " + " ".join(f"actual_TCP_pose_{i}" for i in range(6))
+    log.write_text(header + "\n0.0 1 2 3 0 0 0\n0.1 1 2 4 0 0 0\n")
+    told = found(log)
+    assert not told["ours"]
+    assert told["rows"] == 2
+    assert told["mapping"]["z"] == "actual_TCP_pose_2"
+    assert "--layout ur" in dmpcli(log).stdout
+
+    log.write_text("time,x,y,pz,who\n0,1,2,3,me\n1,2,3,4,me\n")
+    assert "--map t=time --map z=pz" in dmpcli(log).stdout
+    log.write_text("a,b\n1,2\n")
+    assert "no column looks like t, x, y, z" in dmpcli(log).stdout
+
+    other = tmp_path / "other.parquet"
+    pq.write_table(
+        pa.table({"t": [0.0, 1.0], "x": [1.0, None], "y": [0, 1], "z": ["a", "b"]}), other
+    )
+    told = found(other)
+    assert told["format"] == "Parquet"
+    assert [column["missing"] for column in told["columns"]][:3] == [0, 1, 0]
+    assert "as it is" in dmpcli(other).stdout
+
+
+@pytest.mark.parametrize("name", ["skill", "plane", "tool"])
+def test_published_schemas_are_valid_json_schemas(name):
+    result = dmpcli("--schema", name)
+    assert result.exit_code == 0
+    jsonschema.Draft202012Validator.check_schema(json.loads(result.stdout))
+
+
+def test_bad_input_is_one_clear_error(tmp_path):
+    cut = tmp_path / "cut.parquet"
+    with open(put(tmp_path, "demo", demonstration()), "rb") as stream:
+        cut.write_bytes(stream.read()[:-50])
+    empty, binary = tmp_path / "empty.csv", tmp_path / "binary"
+    empty.write_text("")
+    binary.write_bytes(bytes(range(256)))
+    newer, toml = tmp_path / "newer.json", tmp_path / "bad.toml"
+    newer.write_text('{"schema": "skill", "version": 99}')
+    toml.write_text("= 3")
+    for words, told in (
+        ([cut], "cut.parquet"),
+        ([empty], "empty"),
+        ([binary], "binary"),
+        ([newer], "newer"),
+        ([toml], "bad.toml"),
+        ([tmp_path / "none"], "no such file"),
+        ([tmp_path], "directory"),
+        ([], "FILE"),
+        (["--schema", "recipe"], "skill, plane"),
+    ):
+        result = dmpcli(*words)
+        assert result.exit_code == 2, words
+        assert result.stdout == ""
+        assert told in result.stderr
+        assert len(result.stderr.strip().splitlines()) <= 2

@@ -1,0 +1,94 @@
+"""Records of the paper's experiment made from closed forms, for the tests of report and inspect."""
+
+import numpy as np
+
+from dmpcli.measures.paper import GENERALIZATION, REPRODUCTION
+from dmpcli.records import schemas
+from dmpcli.records.record import Provenance, Record, encode
+from dmpcli.records.schemas import POSITION, suffixed
+
+START, GOAL = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
+NEW_START, NEW_GOAL = np.array(GENERALIZATION.start), np.array(GENERALIZATION.goal)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def wave(start=START, goal=GOAL, height=49.979, periods=1.0, n=501, normal=UP):
+    """Sine across the start-goal line, minimum-jerk along it, shape (n, 3)."""
+    s = np.linspace(0.0, 1.0, n)
+    u = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    v = np.cross(normal, goal - start)
+    return (
+        start
+        + u * (goal - start)
+        + 0.5 * height * np.sin(2 * np.pi * periods * u) * v / np.linalg.norm(v)
+    )
+
+
+def circle(centre=START, radius=30.0, n=501):
+    a = np.linspace(0.0, 2 * np.pi, n)
+    return centre + radius * np.column_stack([np.cos(a), np.sin(a), 0 * a])
+
+
+def demonstration(path=None, drag="admittance", noise=0.0, facts=None, dt=0.02):
+    path = wave() if path is None else path
+    path = path + noise * np.random.default_rng(7).standard_normal(path.shape)
+    columns = {"t": np.arange(len(path)) * dt} | dict(zip(POSITION, path.T, strict=True))
+    said = {"simulated": True} | (facts or {})
+    return Record(schemas.DEMONSTRATION, columns, Provenance("record", {"drag": drag}, (), said))
+
+
+def trajectory(path, ids=None, dt=0.02, **facts):
+    """One stroke, or several of equal length when `ids` names them."""
+    ids = ["1"] if ids is None else ids
+    each = len(path) // len(ids)
+    columns = {
+        "id": np.repeat(np.array(ids, dtype=object), each),
+        "t": np.tile(np.arange(each) * dt, len(ids)),
+    } | dict(zip(POSITION, path.T, strict=True))
+    known = {"model": "modified", "forcing_scale": None} | facts
+    if len(ids) == 1:
+        known = {"start": path[0].tolist(), "goal": path[-1].tolist(), "normal": [0, 0, 1]} | known
+    return Record(schemas.TRAJECTORY, columns, Provenance("generalize", {}, (), known))
+
+
+def run(planned, lag=3, late=()):
+    """The trajectory as drawn by an arm `lag` cycles behind, after five cycles of approach."""
+    plan = np.vstack([np.repeat(planned.position()[:1], 5, axis=0), planned.position()])
+    actual = np.vstack([np.repeat(plan[:1], lag, axis=0), plan[: len(plan) - lag]])
+    n = len(plan)
+    t = np.arange(n) * 0.02
+    lateness = np.full(n, 1e-4)
+    for i in late:
+        lateness[i] = 0.03
+    columns = {"t": t, "t_plan": np.clip(t - 0.1, 0, None), "deadline": t, "lateness": lateness}
+    for suffix, values in (("plan", plan), ("sent", plan)):
+        columns |= dict(zip(suffixed(POSITION, suffix), values.T, strict=True))
+    columns |= dict(zip(POSITION, actual.T, strict=True))
+    columns["state"] = np.array(["ready"] * n, dtype=object)
+    columns["phase"] = np.array(["approach"] * 5 + ["stroke"] * (n - 5), dtype=object)
+    facts = {"trajectory": planned.provenance.facts, "simulated": True}
+    return Record(schemas.RUN, columns, Provenance("execute", {}, (), facts))
+
+
+def paper_files(folder):
+    """Write the paper's experiment with known wave heights; return the paths by name."""
+    records = {
+        "demo": demonstration(),
+        "original": trajectory(wave(height=47.7), model="original", forcing_scale="axis"),
+        "modified": trajectory(wave(height=49.2)),
+        "literal": trajectory(
+            wave(NEW_START, NEW_GOAL, 98.1), model="original", forcing_scale="axis"
+        ),
+        "distance": trajectory(
+            wave(NEW_START, NEW_GOAL, 45.7), model="original", forcing_scale="distance"
+        ),
+        "carried": trajectory(wave(NEW_START, NEW_GOAL, 49.9)),
+    }
+    records["drawn"] = run(records["carried"], late=[50])
+    return {name: put(folder, name, record) for name, record in records.items()}
+
+
+def put(folder, name, record):
+    path = folder / f"{name}.parquet"
+    path.write_bytes(encode(record))
+    return str(path)

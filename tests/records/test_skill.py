@@ -1,0 +1,119 @@
+"""Skill files: exact, published, and refused by name when wrong."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmpcli.errors import InputError
+from dmpcli.primitives.learning import fit
+from dmpcli.primitives.preparation import Choices
+from dmpcli.records import plane, publish, skill
+from dmpcli.records.record import Provenance
+from dmpcli.records.streams import Source
+from tests.primitives.strokes import circle, paper_stroke
+
+REPRODUCTION = skill.Reproduction(
+    sha256="0" * 64, duration=10.0, rms=0.1, largest=0.2, end=0.0, smoothing=0.0
+)
+
+
+def encoded(stroke=None, **choices):
+    result = fit([stroke or paper_stroke(turning=True)], Choices(**choices))
+    return result.skill, skill.encode(result.skill, [REPRODUCTION], Provenance("fit"))
+
+
+@pytest.mark.parametrize("model", ["modified", "original"])
+@pytest.mark.parametrize("stroke", [paper_stroke(turning=True), circle()], ids=["open", "closed"])
+def test_a_skill_round_trips_exactly(model, stroke):
+    before, content = encoded(stroke, model=model)
+    after, _ = skill.decode(Source("s.json", content))
+    for name in ("weights", "alpha_f", "start", "goal", "initial_velocity", "forcing_factor"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+    np.testing.assert_array_equal(after.basis.centres, before.basis.centres)
+    np.testing.assert_array_equal(after.frame.axes, before.frame.axes)
+    assert after.spring.tau == before.spring.tau
+    if before.frame.rotation is not None:
+        np.testing.assert_allclose(after.frame.rotation, before.frame.rotation, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", sorted(publish.SCHEMAS))
+def test_the_published_json_schema_is_the_models(name):
+    published = (publish.folder() / f"{name}.schema.json").read_text(encoding="utf-8")
+    assert published == publish.text(name), "run make schemas"
+    jsonschema.Draft202012Validator.check_schema(json.loads(published))
+
+
+def test_our_files_keep_to_their_published_schema():
+    jsonschema.validate(json.loads(encoded()[1]), skill.schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(json.loads(changed(tau=-1.0)), skill.schema())
+
+
+def test_a_weight_is_on_a_line_of_its_axis():
+    text = encoded(basis=7)[1].decode()
+    assert max(len(line) for line in text.splitlines()) < 7 * 30
+    assert text.count("\n") < 120
+
+
+def changed(**changes):
+    document = json.loads(encoded()[1])
+    for key, value in changes.items():
+        if value is None:
+            del document[key]
+        else:
+            document[key] = value
+    return json.dumps(document).encode()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"{", "is not JSON"),
+        (b"\x80{}", "is not JSON: not text"),
+        (b"[1]", "not an object"),
+        (b'{"schema": "plane"}', "has schema 'plane', a skill"),
+        (changed(version=99), "version 99 is newer"),
+        (changed(weights=None), "weights: Field required"),
+        (changed(k=[1.0]), "k: "),
+        (changed(centres=[1.0]), "centres, widths and weights must each have basis"),
+        (changed(tau=-1.0), "tau: "),
+        (changed(d=[0.0] * 6), "k, d and widths must be positive"),
+        (changed(extra=1), "extra: "),
+        (changed(tau=float("nan")), "tau: "),
+    ],
+)
+def test_a_wrong_skill_file_is_refused_by_what_is_wrong(content, message):
+    with pytest.raises(InputError, match=message) as caught:
+        skill.decode(Source("s.json", content))
+    assert str(caught.value).startswith("s.json")
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_refused_by_name(text):
+    with pytest.raises(InputError, match=r"s\.json"):
+        skill.decode(Source("s.json", text.encode()))
+
+
+def test_a_plane_is_a_point_and_a_normal_of_any_length():
+    found = plane.decode(Source("p", b'{"point": [1, 2, 3], "normal": [0, 0, 5]}'))
+    np.testing.assert_array_equal(found.normal, [0, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'{"point": [1, 2, 3]}', "normal: Field required"),
+        (b'{"point": [1, 2, 3], "normal": [0, 0, 0]}', "normal: is zero"),
+        (b'{"point": [1, 2], "normal": [0, 0, 1]}', "point: "),
+        (b'{"point": [1, 2, 3], "normal": [0, 0, NaN]}', "normal.2: "),
+        (b'{"schema": "skill", "point": [1, 2, 3], "normal": [0, 0, 1]}', "schema: "),
+        (b'{"version": 7}', "version 7 is newer"),
+    ],
+)
+def test_a_wrong_plane_file_is_refused_by_what_is_wrong(content, message):
+    with pytest.raises(InputError, match=message):
+        plane.decode(Source("p.json", content))

@@ -1,0 +1,251 @@
+import signal
+
+import numpy as np
+import pytest
+from streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, plan, stroke
+
+from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.rotations import exp
+from dmpcli.streaming.interruption import Interruption
+from dmpcli.streaming.loop import DONE, Arm, Loop, Watch
+
+WATCH = Watch(5.0, 0.1, 50.0)
+
+
+class Bench:
+    def __init__(self, made=None, jumps=None, at=None, **servo):
+        self.plan = plan() if made is None else made
+        self.clock = FakeClock(self.plan.period, jumps)
+        self.servo = FakeServo(self.clock, at=at, **servo)
+        self.interruption = Interruption()
+        self.loop = Loop(self.plan, WIDE, WATCH, Arm(self.servo, self.servo.info, self.clock))
+        self.log = self.loop.log
+
+    def run(self):
+        return self.loop.run(self.interruption)
+
+    def column(self, name):
+        return np.array([getattr(row, name) for row in self.log.rows])
+
+    def stroke_rows(self):
+        return [row for row in self.log.rows if row.phase == "stroke"]
+
+
+def test_an_undisturbed_run_sends_the_plan():
+    bench = Bench()
+    outcome = bench.run()
+    assert (outcome.reason, outcome.error, outcome.signal, outcome.missed) == (DONE, None, None, 0)
+    sent = np.array([row.sent[0] for row in bench.stroke_rows()])
+    assert np.array_equal(sent, bench.plan.position)
+    assert np.array_equal(bench.column("deadline"), np.arange(len(bench.log.rows)) * 0.02)
+    assert np.all(bench.column("lateness") < 1e-9)
+    assert bench.servo.calls == ["start", "stop"]
+
+
+def test_it_holds_the_goal_until_the_look_ahead_has_passed():
+    bench = Bench()
+    bench.run()
+    held = [row for row in bench.log.rows if row.phase == "stop"]
+    assert len(held) * 0.02 >= 0.2
+    assert all(np.array_equal(row.sent[0], bench.plan.position[-1]) for row in held)
+
+
+def test_a_small_delay_is_not_carried_on():
+    bench = Bench(jumps={100: 0.015})
+    assert bench.run().missed == 0
+    late = bench.column("lateness")
+    assert late[100] == pytest.approx(0.015)
+    assert np.delete(late, 100).max() < 1e-9
+    assert len(bench.stroke_rows()) == 501
+
+
+def test_a_late_cycle_skips_and_the_index_stays_the_time():
+    """65 ms late at deadline 100: deadlines 100-102 are gone, number 103 is sent 5 ms late."""
+    bench = Bench(jumps={100: 0.065})
+    outcome = bench.run()
+    assert (outcome.reason, outcome.missed) == (DONE, 3)
+    rows = bench.log.rows
+    np.testing.assert_allclose(
+        bench.column("deadline")[98:102], [1.96, 1.98, 2.06, 2.08], atol=1e-9
+    )
+    assert rows[100].lateness == pytest.approx(0.005)
+    for row in bench.stroke_rows():
+        assert np.array_equal(row.sent[0], bench.plan.position[round(row.deadline / 0.02)])
+    assert np.all(np.diff(bench.column("t")) > 0)
+    assert len(bench.stroke_rows()) == 501 - 3
+
+
+def test_a_late_first_cycle_skips_too():
+    """45 ms late at the very start: the first set-point sent is number 2, its due one."""
+    bench = Bench(jumps={0: 0.045})
+    assert bench.run().missed == 2
+    assert np.array_equal(bench.log.rows[0].sent[0], bench.plan.position[2])
+
+
+def test_no_two_set_points_leave_in_one_period_after_a_delay():
+    bench = Bench(jumps={100: 0.065})
+    bench.run()
+    at = bench.column("deadline") + bench.column("lateness")
+    assert np.diff(at).min() > 0.0149
+
+
+def test_later_than_half_the_look_ahead_stops():
+    bench = Bench(jumps={100: 0.11})
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert "110 ms late" in outcome.reason
+    assert "look-ahead" in outcome.reason
+    assert len(bench.servo.sent) == 100
+    assert len(bench.log.rows) == 101
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_without_a_look_ahead_a_period_is_allowed():
+    assert Bench(jumps={100: 0.019}, lookahead=0.0).run().error is None
+    assert Bench(jumps={100: 0.021}, lookahead=0.0).run().error is RefusedError
+
+
+@pytest.mark.parametrize("mode", ["emergency stop", "protective stop", "fault", "not ready"])
+def test_any_mode_but_ready_stops_at_once(mode):
+    bench = Bench(at={200: lambda servo: setattr(servo, "mode", mode)})
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert mode in outcome.reason
+    assert len(bench.servo.sent) == 200
+    last = bench.log.rows[-1]
+    assert last.state == mode
+    assert len(bench.log.rows) == 201
+    assert np.array_equal(last.sent[0], bench.servo.sent[-1][0])
+
+
+def test_a_refused_set_point_stops():
+    bench = Bench(at={150: lambda servo: setattr(servo, "accepts", False)})
+    outcome = bench.run()
+    assert outcome.error is InstrumentError
+    assert "refused" in outcome.reason
+    assert len(bench.servo.sent) == 150
+    assert bench.servo.calls == ["start", "stop"]
+
+
+def test_an_arm_that_stands_still_is_a_following_error():
+    bench = Bench(at={200: lambda servo: setattr(servo, "stuck", True)})
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert "following error" in outcome.reason
+    moved = np.linalg.norm(bench.servo.sent[-1][0] - bench.servo.position)
+    assert WATCH.following_error < moved < 20.0
+
+
+def test_an_arm_that_strays_is_a_following_error():
+    def push(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 5.1])
+
+    outcome = Bench(at={200: push}).run()
+    assert outcome.error is RefusedError
+    assert "following error 5.1" in outcome.reason
+
+
+def test_an_arm_that_twists_is_a_following_error():
+    def twist(servo):
+        servo.stuck = True
+        servo.rotation = exp(np.array([0.0, 0.15, 0.0])) @ PEN_DOWN
+
+    outcome = Bench(at={200: twist}).run()
+    assert outcome.error is RefusedError
+    assert "0.150 rad" in outcome.reason
+
+
+def test_the_delay_of_the_look_ahead_is_no_following_error():
+    """A stroke at 150 mm/s behind 0.2 s lags by 30 mm, along its own path."""
+
+    class Delayed(FakeServo):
+        def state(self):
+            state = super().state()
+            if len(self.sent) > 10:
+                self.position, self.rotation = self.sent[-11]
+                return type(state)(state.t, self.position, self.rotation, state.mode)
+            return type(state)(state.t, START, PEN_DOWN, state.mode)
+
+    bench = Bench(plan(stroke(duration=2.5)))
+    servo = Delayed(bench.clock)
+    loop = Loop(bench.plan, WIDE, WATCH, Arm(servo, servo.info, bench.clock))
+    assert loop.run(bench.interruption).reason == DONE
+    lag = np.linalg.norm([r.sent[0] - r.actual[0] for r in loop.log.rows], axis=1)
+    assert lag.max() > 3 * WATCH.following_error
+    assert lag[-1] < 1e-9
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("at", [5, 200, 499])
+def test_a_signal_decelerates_along_the_path(number, at):
+    bench = Bench()
+    bench.servo.at[at] = lambda servo: bench.interruption.receive(number)
+    outcome = bench.run()
+    assert (outcome.signal, outcome.error) == (number, None)
+    assert "decelerated" in outcome.reason
+    sent = np.array([row.sent[0] for row in bench.log.rows])
+    acceleration = np.diff(sent, 2, axis=0) / 0.02**2
+    assert np.linalg.norm(acceleration, axis=1).max() <= WIDE.acceleration
+    u = np.unwrap(np.arctan2(0, 1) + (START[0] - sent[:, 0]))
+    on_path = START[1] + 25.0 * np.sin(2 * np.pi * u / 109.0)
+    np.testing.assert_allclose(sent[:, 1], on_path, atol=1e-4)
+    assert {row.phase for row in bench.log.rows[at + 1 :]} <= {"stop"}
+    np.testing.assert_allclose(bench.log.rows[-1].actual[0], sent[-1])
+    if at < 499:
+        assert START[0] - sent[-1, 0] < 108.99
+
+
+def test_a_second_signal_stops_at_once():
+    bench = Bench(plan(stroke(duration=1.6)))
+    bench.servo.at[40] = lambda servo: bench.interruption.receive(signal.SIGINT)
+    bench.servo.at[42] = lambda servo: bench.interruption.receive(signal.SIGINT)
+    outcome = bench.run()
+    assert outcome.signal == signal.SIGINT
+    assert "second signal" in outcome.reason
+    assert len(bench.servo.sent) == 42
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_an_emergency_stop_outweighs_a_signal():
+    def both(servo):
+        bench.interruption.receive(signal.SIGINT)
+        servo.mode = "emergency stop"
+
+    bench = Bench(at={60: both})
+    outcome = bench.run()
+    assert (outcome.error, outcome.signal) == (RefusedError, None)
+
+
+def test_an_instrument_that_fails_keeps_the_rows_and_stops_the_arm():
+    def fail(servo):
+        raise InstrumentError("fake: connection lost")
+
+    bench = Bench(at={123: fail})
+    outcome = bench.run()
+    assert outcome.error is InstrumentError
+    assert outcome.reason == "fake: connection lost"
+    assert len(bench.log.rows) == 123
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_a_defect_is_raised_but_the_arm_is_stopped():
+    def defect(servo):
+        raise ZeroDivisionError
+
+    bench = Bench(at={10: defect})
+    with pytest.raises(ZeroDivisionError):
+        bench.run()
+    assert bench.servo.calls[-1] == "stop"
+    assert len(bench.log.rows) == 10
+
+
+def test_an_arm_that_never_rests_is_reported():
+    def shake(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 0.2 * (-1) ** servo.reads])
+        servo.at[servo.reads] = shake
+
+    outcome = Bench(at={502: shake}).run()
+    assert outcome.error is InstrumentError
+    assert "does not come to rest" in outcome.reason

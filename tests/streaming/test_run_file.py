@@ -1,0 +1,39 @@
+import numpy as np
+from streaming_fakes import PEN_DOWN, START
+
+from dmpcli.records import record, schemas
+from dmpcli.records.record import Provenance, Record
+from dmpcli.records.streams import Source
+from dmpcli.rotations import from_euler
+from dmpcli.streaming.run_file import Log, Row, columns
+
+
+def row(i, wrench=None):
+    pose = (START + i, from_euler(np.array([np.pi, 0.0, np.pi - 0.02 + 0.01 * i])))
+    return Row(
+        0.02 * i, 0.02 * i, pose, pose, (START, PEN_DOWN), 0.02 * i, 0.0, wrench, -0.5, "ready",
+        "stroke",
+    )  # fmt: skip
+
+
+def test_columns_make_a_run_file_and_angles_do_not_jump():
+    cols = columns(Log([row(i) for i in range(5)]), oriented=True, sensed=False, coupled=True)
+    content = record.encode(Record(schemas.RUN, cols, Provenance("execute")))
+    back = record.decode(Source("run", content), schemas.RUN)
+    np.testing.assert_allclose(back.position("sent"), [START + i for i in range(5)])
+    np.testing.assert_allclose(np.diff(back.columns["rz_plan"]), 0.01, atol=1e-9)
+    assert set(back.columns["coupling"]) == {-0.5}
+    assert not back.has("fx")
+
+
+def test_what_was_not_asked_for_is_absent():
+    cols = columns(Log([row(0)]), oriented=False, sensed=True, coupled=False)
+    assert "rx_plan" not in cols
+    assert "rx_sent" in cols
+    assert "coupling" not in cols
+
+
+def test_a_wrench_that_is_missing_in_one_row_is_not_a_number():
+    cols = columns(Log([row(0), row(1, np.arange(6.0))]), True, True, False)
+    assert np.isnan(cols["fz"][0])
+    assert [cols[n][1] for n in ("fx", "fz", "tz")] == [0.0, 2.0, 5.0]
