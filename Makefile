@@ -42,6 +42,7 @@ bench: .venv/installed
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python benchmarks/human_strokes.py
+	$(BIN)/python benchmarks/startup.py
 
 # One stroke through the whole tool-chain, against the mock lab.
 

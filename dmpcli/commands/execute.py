@@ -161,14 +161,14 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
 
     sensor = request.sensor or urls.MOCK
     addresses = urls.check(request.robot, sensor, request.allow_mixed)
-    simulated = all(address.simulated for address in addresses)
-    _check_output(request, simulated)
+    repeatable = all(address.simulated for address in addresses)
+    _check_output(request, repeatable)
     tool_file = _read(request.tool)
     found = stroke_file.find(request.trajectory, request.stroke_id)
     coupling = None
     if request.presses:
         coupling = session.coupling_filter(found.stroke, found.facts, settings)
-    realtime = request.realtime or not simulated
+    realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
     scene = session.scene(found.stroke, request.presses)
     bench = urls.connect(request.robot, sensor, clock, allow_mixed=request.allow_mixed, scene=scene)
@@ -182,7 +182,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         if request.output is None:
             return
         loop = _loop(bench, arm, plan, settings, request, coupling, tool_file)
-        provenance = _provenance(settings, request, found, coupling, tool_file, simulated)
+        provenance = _provenance(settings, request, found, coupling, tool_file, bench.simulated)
         outcome = _stream(loop, provenance, request, realtime)
     finally:
         bench.sensor.close()
@@ -190,13 +190,13 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     _end(outcome, request)
 
 
-def _check_output(request: Request, simulated: bool) -> None:
+def _check_output(request: Request, repeatable: bool) -> None:
     from dmpcli.records import streams
 
     if request.output is None:
         return
     streams.check_writable(request.output)
-    if not simulated and not request.force and Path(request.output).exists():
+    if not repeatable and not request.force and Path(request.output).exists():
         raise InputError(
             f"{request.output}: exists, and a run cannot be made again; --force replaces it"
         )
@@ -259,7 +259,7 @@ def _provenance(
     from dmpcli.streaming import session
 
     inputs = [input_of("trajectory", found.source)]
-    if tool_file is not None:
+    if tool_file is not None and request.sensor is not None:
         inputs.append(input_of("tool", tool_file))
     named = {"robot": request.robot, "sensor": request.sensor}
     instruments = {

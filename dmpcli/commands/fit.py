@@ -8,6 +8,7 @@ import typer
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
+    from dmpcli.arrays import Floats
     from dmpcli.primitives.learning import Fit
     from dmpcli.records.recordings import Layout
 
@@ -145,8 +146,6 @@ def _layout(
 
 def _summary(output: str, names: list[str], result: "Fit") -> str:
     """Return what a person wants to know of a fit, a line per demonstration."""
-    from dmpcli.measures.wave import wave_heights
-
     skill = result.skill
     kind = "closed" if skill.closed else f"start to goal {skill.frame.length:.3f} mm"
     lines = [f"{output}: {skill.model} DMP, N = {len(skill.basis)}, {skill.duration:.3f} s, {kind}"]
@@ -166,12 +165,18 @@ def _summary(output: str, names: list[str], result: "Fit") -> str:
             f"end {r.end:.4f}; smoothing ({prepared.cutoff:.2f} Hz) took off "
             f"{prepared.removed:.4f} mm RMS; trimmed {before:.2f} s and {after:.2f} s"
         )
-        if not skill.closed:
-            demonstrated = wave_heights(r.demonstrated[:, 1])
-            reproduced = wave_heights(r.reproduced[:, 1])
-            if len(demonstrated.heights):
-                lines.append(
-                    f"  wave height {demonstrated.mean:.3f} mm demonstrated, "
-                    f"{reproduced.mean:.3f} mm reproduced"
-                )
+        demonstrated, reproduced = (_wave_height(x) for x in (r.demonstrated, r.reproduced))
+        if not skill.closed and demonstrated is not None and reproduced is not None:
+            lines.append(
+                f"  wave height {demonstrated:.3f} mm demonstrated, {reproduced:.3f} mm reproduced"
+            )
     return "\n".join(lines)
+
+
+def _wave_height(chart: "Floats") -> float | None:
+    """Return the mean wave height of a stroke in chart coordinates; None for a line."""
+    import numpy as np
+
+    from dmpcli.measures.wave import stroke_wave
+
+    return stroke_wave(chart, chart[0], chart[-1], np.array([0.0, 0.0, 1.0])).mean

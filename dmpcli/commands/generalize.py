@@ -35,6 +35,9 @@ def command(
     ],
     start: Annotated[Point | None, typer.Option(help="New start X Y Z, mm.")] = None,
     goal: Annotated[Point | None, typer.Option(help="New goal X Y Z, mm.")] = None,
+    reproduce: Annotated[
+        bool, typer.Option("--reproduce", help="At the demonstrated start and goal.")
+    ] = False,
     start_orientation: Annotated[
         Point | None, typer.Option(help="Tool orientation at the start, RX RY RZ, rad.")
     ] = None,
@@ -98,9 +101,11 @@ def command(
     )
     if on_error not in ("stop", "skip"):
         raise InputError(f"--on-error {on_error}: must be stop or skip")
-    _check_destination(output, start, goal, pairs)
+    _check_destination(output, start, goal, pairs, reproduce)
     source = streams.read(skill)
     learned, _ = skill_file.decode(source)
+    if reproduce:
+        start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
     given = None
     if surface is not None:
@@ -130,14 +135,21 @@ def command(
 
 
 def _check_destination(
-    output: Path, start: Point | None, goal: Point | None, pairs: Path | None
+    output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
 ) -> None:
     from dmpcli.commands.options import finite
     from dmpcli.records import streams
 
+    if reproduce:
+        if any(given is not None for given in (start, goal, pairs)):
+            raise InputError("--reproduce takes the demonstrated ends; leave other ends out")
+        streams.check_writable(output)
+        return
     if pairs is None:
         if start is None or goal is None:
-            raise InputError("give --start X Y Z and --goal X Y Z, or a table with --pairs")
+            raise InputError(
+                "give --start X Y Z and --goal X Y Z, --reproduce, or a table with --pairs"
+            )
         finite("--start", start)
         finite("--goal", goal)
         streams.check_writable(output)

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dmpcli.commands.messages import tell
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.drag.loop import Ending, Recorder
-    from dmpcli.drag.references import Reference
     from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.streams import Source
 
@@ -83,6 +83,8 @@ def command(
     check(settings)
     addresses = urls.check(robot, sensor, allow_mixed)
     simulated = any(address.simulated for address in addresses)
+    if settings.drag == "admittance" and settings.coasting > 1.0:
+        tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)
     check_output(output, simulated, force)
     tool_source = streams.read(tool) if tool else None
     stroke = references.build(settings)
@@ -101,13 +103,15 @@ def command(
             rehearsed.longest,
             lambda: signals.number is not None or (realtime and enter.pressed()),
             rehearsed.begin,
+            rehearsed.lead_in,
         )
         ending = recorder.run()
-    options = {"robot": robot, "sensor": sensor, "realtime": realtime}
     if len(recorder.log):
-        content = _file(recorder, settings, stroke, tool_source, options, ending.reason)
+        options = {"robot": robot, "sensor": sensor, "realtime": realtime}
+        facts = {"simulated": simulated, "reference": stroke.facts, "ended": ending.reason}
+        content = _file(recorder, settings, options, facts, tool_source, stroke.source)
         streams.write(output, content)
-    _tell(output, recorder, ending, quiet)
+    tell(_summary(output, recorder, ending), quiet)
     if ending.failure is not None:
         raise ending.failure
     if signals.number is not None:
@@ -147,31 +151,28 @@ def _status(wanted: bool) -> Any:
 def _file(
     recorder: "Recorder",
     settings: "RecordSettings",
-    stroke: "Reference",
-    tool: "Source | None",
     options: dict[str, Any],
-    ended: str,
+    facts: dict[str, Any],
+    tool: "Source | None",
+    reference: "Source | None",
 ) -> bytes:
     from dmpcli.records.record import Provenance, Record, encode, input_of
     from dmpcli.records.schemas import DEMONSTRATION
 
-    sources = [("tool", tool), ("reference", stroke.source)]
+    settled = settings.model_dump(mode="json")
     # The reference's name may be a path; what it holds stands in the inputs.
-    settled = settings.model_dump(mode="json") | {"reference": stroke.facts["shape"]}
+    settled["reference"] = facts["reference"]["shape"]
+    sources = [("tool", tool), ("reference", reference)]
     provenance = Provenance(
         "record",
         options=options | settled,
         inputs=tuple(input_of(role, source) for role, source in sources if source),
-        facts={"simulated": True, "reference": stroke.facts, "ended": ended},
+        facts=facts,
     )
     return encode(Record(DEMONSTRATION, recorder.log.columns(), provenance))
 
 
-def _tell(output: str, recorder: "Recorder", ending: "Ending", quiet: bool) -> None:
-    import sys
-
-    if quiet:
-        return
+def _summary(output: str, recorder: "Recorder", ending: "Ending") -> str:
     endings = {
         "duration": "its time was over",
         "rest": "the tool came to rest",
@@ -180,8 +181,5 @@ def _tell(output: str, recorder: "Recorder", ending: "Ending", quiet: bool) -> N
     name = "standard output" if output == "-" else output
     late = f", {ending.missed} cycles missed" if ending.missed else ""
     why = endings.get(ending.reason, "an instrument failed")
-    print(  # noqa: T201
-        f"{name}: {len(recorder.log)} rows, {recorder.log.duration:.2f} s{late}; ended because "
-        f"{why}",
-        file=sys.stderr,
-    )
+    log = recorder.log
+    return f"{name}: {len(log)} rows, {log.duration:.2f} s{late}; ended because {why}"

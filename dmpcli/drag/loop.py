@@ -4,6 +4,7 @@ Deadlines are absolute. The loop stops by itself where going on would not be saf
 saturated sensor, a robot that is not ready or refuses a set-point.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -80,7 +81,9 @@ class Recorder:
     asked_to_end : callable
         Read once a cycle; True ends the recording.
     begin : callable, optional
-        Called with the time at which the recording begins, s.
+        Called with the time from which the tool can be dragged, s.
+    lead_in : float
+        How long it is dragged before the recording begins, s.
     """
 
     def __init__(
@@ -93,10 +96,12 @@ class Recorder:
         longest: float = np.inf,
         asked_to_end: Callable[[], bool] = lambda: False,
         begin: Callable[[float], None] = lambda _: None,
+        lead_in: float = 0.0,
     ) -> None:
         self._robot, self._sensor, self._clock = robot, sensor, clock
         self._tool, self._settings = tool, settings
         self._longest, self._asked_to_end, self._begin = longest, asked_to_end, begin
+        self._lead_in = lead_in
         self._law, self._bounds = settings.law, settings.bounds
         self._period = self._law.period
         self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
@@ -175,8 +180,8 @@ class Recorder:
             reference = None
         else:
             self._robot.start(self._period)
-        began = self._clock.now()
-        self._begin(began)
+        start = self._clock.now()
+        self._begin(start)
         cycle = missed = 0
         try:
             while True:
@@ -191,18 +196,19 @@ class Recorder:
                         else brake(self._law, reference, self._bounds)
                     )
                     self._send(reference)
-                self.log.add(state.t - began, state, reference, self._wrench, self._newest)
-                reason = self._reason_to_end(state.t - began)
+                t = state.t - start - self._lead_in
+                if t > -0.5 * self._period:
+                    self.log.add(t, state, reference, self._wrench, self._newest)
+                reason = self._reason_to_end(t)
                 if reason is not None:
-                    self._come_to_rest(reference, began + cycle * self._period)
+                    self._come_to_rest(reference, start + cycle * self._period)
                     return Ending(reason, missed=missed)
                 cycle += 1
-                # A loop that is late skips cycles; it never sends a burst of set-points.
-                late = int((self._clock.now() - began) / self._period - cycle)
-                if late > 0:
-                    missed += late
-                    cycle += late
-                self._clock.sleep_until(began + cycle * self._period)
+                # A loop that is late waits for the next deadline; it never sends a burst.
+                due = math.ceil((self._clock.now() - start) / self._period - 1e-6)
+                missed += max(due - cycle, 0)
+                cycle = max(due, cycle)
+                self._clock.sleep_until(start + cycle * self._period)
         except (InstrumentError, RefusedError) as failure:
             self._robot.stop()
             return Ending(str(failure), failure, missed)
@@ -253,7 +259,12 @@ class Recorder:
         if t >= self._longest - 0.5 * self._period:
             return "duration"
         rest = self._settings.until_rest
-        if rest is not None and self.log.moved(MOVED) and self.log.still(rest, STILL):
+        if (
+            rest is not None
+            and len(self.log)
+            and self.log.moved(MOVED)
+            and self.log.still(rest, STILL)
+        ):
             return "rest"
         return None
 

@@ -15,6 +15,7 @@ from dmpcli.primitives import references
 from dmpcli.records import streams
 from dmpcli.records.streams import Source
 
+AXES = ("x", "y", "z")
 SHAPES = ("sine", "line", "circle")
 DURATION = 10.0
 """Of a stroke where nothing else is said, s."""
@@ -122,24 +123,27 @@ def read_points(source: Source) -> Floats:
     try:
         text = source.content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(
-            f"{source.name}: is not a text file; a CSV with x, y, z is needed"
-        ) from None
-    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
-    names = [name.strip() for name in rows.fieldnames or []]
-    rows.fieldnames = names
-    for column in ("x", "y", "z"):
+        raise InputError(f"{source.name}: is not text; a CSV with x, y, z is needed") from None
+    # newline="": csv tells line ends and quoted ones apart by itself.
+    rows = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+    try:
+        table = [row for row in rows if row]
+    except csv.Error as error:
+        raise InputError(f"{source.name}: is not CSV: {error}") from None
+    names = [name.strip() for name in table[0]] if table else []
+    for column in AXES:
         if column not in names:
             raise InputError(
                 f"{source.name}: column {column!r} is missing; the first row has {', '.join(names)}"
             )
-    try:
-        points = [
-            [_number(row[column], source.name, column, number) for column in ("x", "y", "z")]
-            for number, row in enumerate(rows, start=1)
+    places = [(column, names.index(column)) for column in AXES]
+    points = [
+        [
+            _number(row[place] if place < len(row) else "", source.name, column, number)
+            for column, place in places
         ]
-    except csv.Error as error:
-        raise InputError(f"{source.name}: is not CSV: {error}") from None
+        for number, row in enumerate(table[1:], start=1)
+    ]
     array = np.array(points).reshape(-1, 3)
     if len(array) < 2 or np.ptp(array, axis=0).max() < 1e-3:
         raise InputError(
@@ -148,9 +152,9 @@ def read_points(source: Source) -> Floats:
     return array
 
 
-def _number(text: str | None, file: str, column: str, row: int) -> float:
+def _number(text: str, file: str, column: str, row: int) -> float:
     try:
-        value = float(text or "")
+        value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -7,7 +7,7 @@ import numpy as np
 
 from dmpcli.drag.references import DURATION, Reference
 from dmpcli.drag.settings import RecordSettings
-from dmpcli.drag.tutor import HandParameters, Tutor
+from dmpcli.drag.tutor import HandParameters, Tutor, stroke_time
 from dmpcli.errors import InputError
 from dmpcli.instruments.mock import Lab, Plate, Scene
 
@@ -24,12 +24,15 @@ class Rehearsal:
     Attributes
     ----------
     begin : callable
-        Tells the tutor the time at which the recording begins, s.
+        Tells the tutor the time at which the tool may be dragged, s.
+    lead_in : float
+        How long the tutor then takes to set the pen down, s.
     longest : float
         How long the recording may take, s; infinite where a person ends it.
     """
 
     begin: Callable[[float], None]
+    lead_in: float
     longest: float
 
 
@@ -71,10 +74,11 @@ def rehearse(lab: Lab | None, reference: Reference, settings: RecordSettings) ->
     Raises
     ------
     InputError
-        The tool does not stand where the stroke begins.
+        The tool does not stand where the stroke begins, or the stroke needs more speed than the
+        reference may have.
     """
     if lab is None:
-        return Rehearsal(lambda _: None, settings.duration or np.inf)
+        return Rehearsal(lambda _: None, 0.0, settings.duration or np.inf)
     away = float(np.linalg.norm(lab.arm.position - reference.start))
     if away > _REACH:
         raise InputError(
@@ -82,10 +86,23 @@ def rehearse(lab: Lab | None, reference: Reference, settings: RecordSettings) ->
             "leave x, y, z out of the URL, or give --start"
         )
     hand = HandParameters()
+    _check_speed(reference, settings, hand)
     duration = settings.duration or DURATION + 2.0 * hand.rest
-    tutor = Tutor(reference, lab.arm.rotation, duration, settings.seed, hand)
+    tutor = Tutor(reference, lab.arm.rotation, duration, settings, hand)
     lab.hand = tutor
     longest = duration
     if settings.duration is None and settings.until_rest is not None:
         longest += settings.until_rest + _SETTLING
-    return Rehearsal(tutor.begin, longest)
+    return Rehearsal(tutor.begin, hand.lead_in, longest)
+
+
+def _check_speed(reference: Reference, settings: RecordSettings, hand: HandParameters) -> None:
+    duration = DURATION if settings.duration is None else stroke_time(settings.duration, hand)[1]
+    t = np.linspace(0.0, duration, 1001)
+    step = np.linalg.norm(np.diff(reference.at(t, duration), axis=0), axis=1)
+    needed = float(step.max()) / t[1]
+    if needed > settings.speed:
+        raise InputError(
+            f"--duration: a stroke in {duration:g} s would need {needed:.0f} mm/s, and [record] "
+            f"speed is {settings.speed:g}; give it more time"
+        )

@@ -9,7 +9,7 @@ from dmpcli.errors import InputError
 from dmpcli.primitives.admittance import Bounds, Law, check_stable
 from dmpcli.records.settings import Settings
 
-Six = Annotated[tuple[float, float, float, float, float, float], Field()]
+Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -60,6 +60,11 @@ class RecordSettings(Settings):
             np.array(self.stiffness),
             1.0 / self.control_rate,
         )
+
+    @property
+    def coasting(self) -> float:
+        """Longest M/D of the axes, s: how long the tool runs on when it is let go."""
+        return float(np.max(np.array(self.mass) / np.array(self.damping)))
 
     @property
     def bounds(self) -> Bounds:

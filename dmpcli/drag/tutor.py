@@ -2,8 +2,9 @@
 
 A spring and a damper pull the pen towards a point a little ahead on the stroke, a turning spring
 keeps its attitude, and the hand presses the pen into the plate. What makes it a hand: it looks
-ahead, it pushes with what the tool is known to take (practice: viscous drag, friction and the
-dead-band), its aim wanders slowly, and it trembles at 8-12 Hz.
+ahead, it pushes with what the tool is known to take (practice with this admittance model: its mass,
+drag and spring, the dead-band and the pen's friction), it pushes harder while the pen stays off its
+aim, its aim wanders slowly, and it trembles at 8-12 Hz.
 """
 
 from dataclasses import dataclass
@@ -12,9 +13,12 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.drag.references import Reference
+from dmpcli.drag.settings import RecordSettings
 
 _TABLE_RATE = 200.0
 _HOLD = 3.0
+# mm/s: the hand pushes against the full friction from this speed on.
+_SLIDING = 2.0
 
 
 @dataclass(frozen=True)
@@ -29,15 +33,11 @@ class HandParameters:
         About the attitude held, N·m/rad and N·m·s/rad.
     preview : float
         How far ahead the hand aims, s: it has learnt the delay of arm, filter and loop.
-    viscous_feel : float
-        Drag of the tool that practice has taught, N·s/mm; pushed against in advance.
-    inertial_feel : float
-        Mass of the tool that practice has taught, N·s²/mm: the model's 5 kg, and the delay of arm,
-        filter and loop (some 0.09 s), which feels like more.
     correction : float
-        How fast the hand pushes harder while the eye sees the pen off its aim, N/s per mm.
-    friction_feel : float
-        Dry friction that practice has taught, N: the pen's on the plate and the dead-band.
+        How fast the hand pushes harder while the eye sees the pen off its aim, N/s per mm; slower
+        with a tool so heavy that this would swing.
+    pen_friction : float
+        What the pen is known to rub on the plate with, N.
     press : float
         Into the plate, N.
     wander, turning_wander : float
@@ -46,8 +46,10 @@ class HandParameters:
         RMS at 8-12 Hz per axis, N and N·m.
     rest : float
         How long the hand rests before and after the stroke, s.
+    lead_in : float
+        How long the hand takes to set the pen down before the recording begins, s.
     grip : float
-        How long it takes to take hold, s.
+        How much of that it takes to take hold, s.
     """
 
     stiffness: float = 0.6
@@ -55,17 +57,16 @@ class HandParameters:
     turning_stiffness: float = 10.0
     turning_damping: float = 0.2
     preview: float = 0.09
-    viscous_feel: float = 0.08
-    inertial_feel: float = 0.0125
-    friction_feel: float = 1.4
     correction: float = 0.6
+    pen_friction: float = 0.4
     press: float = 2.0
     wander: float = 0.05
     turning_wander: float = 0.01
     tremor: float = 0.1
     turning_tremor: float = 0.01
     rest: float = 0.4
-    grip: float = 0.2
+    lead_in: float = 1.0
+    grip: float = 0.3
 
 
 class Tutor:
@@ -77,8 +78,9 @@ class Tutor:
     rotation : array, shape (3, 3)
         Attitude that the hand keeps.
     duration : float
-        Of the whole demonstration with both rests, s.
-    seed : int
+        Of the recording, from rest to rest, s.
+    settings : RecordSettings
+        What the hand has practised with, and the seed.
     hand : HandParameters, optional
 
     Attributes
@@ -92,18 +94,19 @@ class Tutor:
         reference: Reference,
         rotation: Floats,
         duration: float,
-        seed: int,
+        settings: RecordSettings,
         hand: HandParameters | None = None,
     ) -> None:
         self._hand = hand = HandParameters() if hand is None else hand
         self.duration = duration
+        self._push_rate = _push_rate(hand, settings)
         self._rotation = rotation
         self._began = self._seen = np.inf
         self._correction = np.zeros(3)
-        self._table = _table(reference, duration, np.random.default_rng([seed, 0x4A]), hand)
+        self._table = _table(reference, duration, settings, hand)
 
     def begin(self, t: float) -> None:
-        """Take hold of the tool at time `t`, s."""
+        """Take hold of the tool at time `t`, s; the recording begins `lead_in` later."""
         self._began = self._seen = t
         self._correction = np.zeros(3)
 
@@ -117,7 +120,7 @@ class Tutor:
         i = int(at)
         row = self._table[i] + (at - i) * (self._table[i + 1] - self._table[i])
         aim, push = row[:3], row[3:]
-        self._correction += hand.correction * (t - self._seen) * (aim - position)
+        self._correction += self._push_rate * (t - self._seen) * (aim - position)
         self._seen = t
         E = self._rotation @ rotation.T
         # sin(angle) times axis: a turning spring that needs no logarithm.
@@ -147,30 +150,50 @@ def stroke_time(duration: float, hand: HandParameters) -> tuple[float, float]:
     return rest, duration - 2.0 * rest
 
 
+def _push_rate(hand: HandParameters, settings: RecordSettings) -> Floats:
+    """N/s per mm on each axis: at most 0.3 of where mass, drag and hand would begin to swing."""
+    law = settings.law
+    steady = (law.damping[:3] + hand.damping) * hand.stiffness / law.mass[:3]
+    return np.minimum(hand.correction, 0.3 * steady)
+
+
 def _table(
-    reference: Reference, duration: float, rng: np.random.Generator, hand: HandParameters
+    reference: Reference, duration: float, settings: RecordSettings, hand: HandParameters
 ) -> Floats:
     """Aim point (3) and the wrench pushed in advance (6), every 1/200 s; shape (rows, 9)."""
+    law, rng = settings.law, np.random.default_rng([settings.seed, 0x4A])
     rest, stroke = stroke_time(duration, hand)
     # The hand goes on holding after the stroke; once the table ends, without a tremble.
-    t = np.arange(round((duration + _HOLD) * _TABLE_RATE) + 1) / _TABLE_RATE
-    ahead = t - rest + hand.preview
+    t = np.arange(round((hand.lead_in + duration + _HOLD) * _TABLE_RATE) + 1) / _TABLE_RATE
+    drawing = t - hand.lead_in - rest
+    ahead = drawing + hand.preview
     point = reference.at(ahead, stroke)
-    velocity = np.gradient(point, 1.0 / _TABLE_RATE, axis=0)
+    velocity = _rounded(np.gradient(point, 1.0 / _TABLE_RATE, axis=0))
     acceleration = np.gradient(velocity, 1.0 / _TABLE_RATE, axis=0)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    # Until it draws, the hand presses harder by the dead-band, which would hold the pen back.
+    press = hand.press + settings.dead_band_force * np.clip(-drawing / 0.2, 0.0, 1.0)
     table = np.zeros((len(t), 9))
     table[:, :3] = point + hand.wander * _unsteady(rng, t, 0.1, 1.0)
     table[:, 3:6] = (
-        (hand.damping + hand.viscous_feel) * velocity
-        + hand.inertial_feel * acceleration
-        + hand.friction_feel * velocity / np.maximum(speed, 1.0)
-        - hand.press * reference.normal
+        (hand.damping + law.damping[:3]) * velocity
+        # Behind a delay, drag feels like more mass.
+        + (law.mass[:3] + hand.preview * law.damping[:3]) * acceleration
+        + law.stiffness[:3] * (point - reference.start)
+        + (hand.pen_friction + settings.dead_band_force) * velocity / np.maximum(speed, _SLIDING)
+        - press[:, None] * reference.normal
         + hand.tremor * _unsteady(rng, t, 8.0, 12.0)
     )
     wander = hand.turning_stiffness * hand.turning_wander * _unsteady(rng, t, 0.1, 1.0)
     table[:, 6:9] = wander + hand.turning_tremor * _unsteady(rng, t, 8.0, 12.0)
     return table
+
+
+def _rounded(velocity: Floats) -> Floats:
+    """Smooth over 0.2 s, shape (rows, 3): a hand takes a corner in that time, not at once."""
+    window = np.hanning(round(0.2 * _TABLE_RATE) + 1)
+    window /= window.sum()
+    return np.column_stack([np.convolve(column, window, "same") for column in velocity.T])
 
 
 def _unsteady(rng: np.random.Generator, t: Floats, low: float, high: float) -> Floats:

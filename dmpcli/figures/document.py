@@ -87,7 +87,9 @@ def as_csv(parts: Sequence[Part]) -> bytes:
     """Return every wave height of every stroke as a row of a CSV file."""
     sink = io.StringIO()
     rows = csv.writer(sink, lineterminator="\n")
-    rows.writerow("stroke role wave height_mm from_t_s to_t_s from_v_mm to_v_mm".split())
+    rows.writerow(
+        ["stroke", "role", "wave", "height_mm", "from_t_s", "to_t_s", "from_v_mm", "to_v_mm"]
+    )
     for stroke in (stroke for part in parts for stroke in part.strokes):
         wave = stroke.wave
         t = wave.at(stroke.t)

@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.primitives.dynamics import Spring
-from dmpcli.primitives.phase import Basis
+from dmpcli.primitives.phase import Basis, significant_exp
 
 Method = Literal["lwr", "ridge"]
 
@@ -58,7 +58,7 @@ def lwr(basis: Basis, s: Floats, xi: Floats, forcing: Floats) -> Floats:
     e = basis.exponents(s)
     # A common factor per function cancels; without it a narrow function between two samples is 0/0.
     e -= e.max(axis=0)
-    weighted = np.exp(e, out=e).T * xi
+    weighted = significant_exp(e).T * xi
     weights: Floats = (weighted @ forcing / (weighted @ xi)[:, None]).T
     return weights
 

@@ -64,7 +64,9 @@ def timing(
     total = float(t[-1])
     elapsed = _eased(t, ease_in) + total - _eased(total - t, ease_out) - t
     elapsed -= elapsed[0]
-    stroke = elapsed * (demonstrated / elapsed[-1])
+    # Rounding must not turn stroke time back where the rate is nearly zero.
+    stroke = np.maximum.accumulate(elapsed * (demonstrated / elapsed[-1]))
+    stroke = np.minimum(stroke, demonstrated)
     stroke[-1] = demonstrated
     return Timing(t, stroke, tau * float(elapsed[-1]) / demonstrated)
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dmpcli import __version__, rotations
-from dmpcli.arrays import AnyArray, Floats
+from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Column, Schema
@@ -108,9 +108,7 @@ def encode(record: Record) -> bytes:
             if column.required:
                 raise KeyError(f"{record.schema.name} lacks column {name}")
             continue
-        values = record.columns[name]
-        mask = np.isnan(values) if values.dtype.kind == "f" else None
-        arrays.append(pa.array(values, type=_TYPES[column.type], mask=mask))
+        arrays.append(_arrow(record.columns[name], _TYPES[column.type]))
         fields.append(
             pa.field(
                 name,
@@ -126,6 +124,20 @@ def encode(record: Record) -> bytes:
         table, sink, compression="zstd", use_byte_stream_split=floats, use_dictionary=others
     )
     return bytes(sink.getvalue().to_pybytes())
+
+
+def _arrow(values: AnyArray, kind: Any) -> Any:
+    """One column for pyarrow; NaN becomes null."""
+    # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
+    if kind == pa.string():
+        texts = [str(value).encode() for value in values]
+        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+        buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
+        return pa.Array.from_buffers(kind, len(texts), buffers)
+    known = ~np.isnan(values) if values.dtype.kind == "f" else np.ones(len(values), dtype=bool)
+    nulls = None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little"))
+    data = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    return pa.Array.from_buffers(kind, len(data), [nulls, pa.py_buffer(data)])
 
 
 def _header(record: Record) -> bytes:
@@ -253,14 +265,14 @@ def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str,
 
 def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
     try:
-        values = chunked.cast(_TYPES[column.type])
+        values = chunked.cast(_TYPES[column.type]).combine_chunks()
     except pa.ArrowException:
         raise InputError(
             f"{name}: column {key!r} holds {chunked.type}, numbers are needed"
             if column.type != "string"
             else f"{name}: column {key!r} holds {chunked.type}, text is needed"
         ) from None
-    nulls = values.is_null().to_numpy()
+    nulls = _nulls(values)
     if column.required and nulls.any():
         raise InputError(
             f"{name}: column {key!r}, row {int(np.argmax(nulls)) + 1}: no value; "
@@ -268,9 +280,11 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
         )
     if column.type == "string":
         return np.asarray(values.to_pylist(), dtype=object)
+    array = _numbers(values)
     if column.type == "int64":
-        return np.asarray(values.fill_null(-1).to_numpy(), dtype=np.int64)
-    array: AnyArray = np.asarray(values.to_numpy(), dtype=float)
+        array[nulls] = -1
+        return array
+    array[nulls] = np.nan
     bad = ~np.isfinite(array) & ~nulls
     if bad.any():
         row = int(np.argmax(bad))
@@ -279,3 +293,21 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
             "remove the row or mend it"
         )
     return array
+
+
+def _nulls(values: Any) -> Booleans:
+    """Tell which values of a pyarrow array are null, shape (rows,)."""
+    if values.null_count == 0:
+        return np.zeros(len(values), dtype=bool)
+    bits = np.frombuffer(values.buffers()[0], dtype=np.uint8)
+    known = np.unpackbits(bits, bitorder="little")[values.offset : values.offset + len(values)]
+    return known == 0
+
+
+def _numbers(values: Any) -> AnyArray:
+    """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
+    dtype = values.type.to_pandas_dtype()
+    if len(values) == 0:
+        return np.empty(0, dtype=dtype)
+    whole = np.frombuffer(values.buffers()[1], dtype=dtype)
+    return whole[values.offset : values.offset + len(values)].copy()

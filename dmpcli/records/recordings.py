@@ -125,7 +125,7 @@ def stroke(source: Source, layout: Layout | None = None) -> Stroke:
         A column is missing, holds text, NaN or infinity, time repeats or runs backward, or there
         are fewer than `SHORTEST` samples; names column and row.
     """
-    if layout is None and tables.is_parquet(source) and _ours(source):
+    if layout is None and record.is_ours(source):
         ours = record.decode(source, schemas.DEMONSTRATION)
         _partly_null(ours)
         t, position, rotation = ours.t, ours.position(), ours.rotation()
@@ -135,17 +135,6 @@ def stroke(source: Source, layout: Layout | None = None) -> Stroke:
         t, position, rotation = _mapped(table, layout or Layout())
     _check_time(table, t, layout or Layout())
     return Stroke(t, position, rotation)
-
-
-def _ours(source: Source) -> bool:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        metadata = pq.read_schema(source.open()).metadata or {}
-    except (pa.ArrowException, OSError, ValueError):
-        return True  # let the reader of our files name what is wrong with it
-    return b"dmpcli" in metadata
 
 
 def _partly_null(ours: record.Record) -> None:

@@ -134,9 +134,9 @@ class Pressing:
         self._calm = 0.0
         self._sought = 0.0
         self._seek = law.setpoint / float(law.model.damping[0])  # mm/s, without contact
-        velocity = plan.derivatives()[0][:, 0]
-        normal = plan.normal_at(0) if plan.normal is None else plan.normal[:-1]
-        lift = np.sum(velocity * normal, axis=-1)
+        if plan.normal is None:
+            raise ValueError("a plan without normals has nothing to press along")
+        lift = np.sum(plan.derivatives()[0][:, 0] * plan.normal[:-1], axis=-1)
         self._retreats = np.append(lift > self._seek, False)
 
     @property

@@ -164,17 +164,19 @@ class Loop:
         Outcome
             Anything that an instrument or a limit can cause; only defects are raised.
         """
+        reason: str = DONE
+        error: type[DmpError] | None = None
         try:
-            self._arm.servo.start(self.plan.period)
-            self._stream(interruption)
-            reason, error = DONE, None
+            try:
+                self._arm.servo.start(self.plan.period)
+                self._stream(interruption)
+            finally:
+                # Also on a defect of ours: nothing may leave the arm moving.
+                self._arm.servo.stop()
         except _Halt as halt:
             reason, error = halt.reason, halt.error
         except InstrumentError as failure:
             reason, error = str(failure), InstrumentError
-        finally:
-            # Also on a defect of ours: nothing may leave the arm moving.
-            self._arm.servo.stop()
         number = interruption.number
         if error is None and number is not None:
             name = signal.Signals(number).name

@@ -11,9 +11,11 @@ from dmpcli.errors import RefusedError
 from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.plan import Plan, Stroke
 
-# A stroke that begins or ends at less than this share of the acceleration limit times the servo
-# period is at rest: the arm takes up the step in velocity within one period, hardly noticing.
-REST_SHARE = 0.1
+# A stroke that begins or ends slower than this share of the acceleration limit times the servo
+# period is at rest, 9 mm/s and 0.06 rad/s by default: the arm takes up such a step in velocity
+# within one period at a fifth of its acceleration. A hand's tremor is less, a stroke that was cut
+# out of a longer motion is more.
+REST_SHARE = 0.2
 
 
 _ENDS = (("start", 1, 0, ("in", "from")), ("end", -1, -1, ("out", "to")))

@@ -19,9 +19,9 @@ class ExecuteSettings(Settings):
 
     The speed is what the safety standards of industrial arms call reduced (250 mm/s). The
     acceleration is that of the EC66's published Cartesian limits (1 m/s, 2.25 m/s², 1.57 rad/s);
-    the rotation speed is half of theirs, and the rotation acceleration has the same ratio to their
-    speed as the linear one. For jerk they state nothing: the acceleration limit shall not be
-    reached in less than 45 ms, about two periods of 20 ms.
+    the rotation speed is half of theirs. For the rest they state nothing, and the values are ours:
+    rotation about a tip 150 mm below the flange shall accelerate the flange no more than the tip
+    may be, and either acceleration is not reached in less than 45 ms, about two periods of 20 ms.
     """
 
     period: Positive = 0.02
@@ -30,8 +30,8 @@ class ExecuteSettings(Settings):
     max_acceleration: Positive = 2250.0
     max_jerk: Positive = 50_000.0
     max_rotation_speed: Positive = 0.785
-    max_rotation_acceleration: Positive = 3.5
-    max_rotation_jerk: Positive = 78.0
+    max_rotation_acceleration: Positive = 15.0
+    max_rotation_jerk: Positive = 333.0
     workspace: tuple[float, float, float, float, float, float] | None = None
     # Inside the tolerance the arm is led to the start at lead_speed; beyond, only when asked.
     start_tolerance: Positive = 2.0

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import os
 import signal
@@ -9,7 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.records import record, schemas, streams
+from dmpcli.commands.execute import Request, _check_output
+from dmpcli.errors import InputError
+from dmpcli.instruments.mock import PEN
+from dmpcli.records import record, schemas, streams, tool
 from dmpcli.records.record import Provenance, Record
 
 START = np.array([-551.030, 131.399, -17.560])
@@ -330,6 +334,17 @@ def test_a_sensor_that_falls_silent_stops_the_run(traj, tmp_path):
     assert 2.8 < run_of(out).t[-1] < 3.2
 
 
+def test_a_tool_file_without_zero_has_it_taken_at_rest(traj, tmp_path):
+    file = tmp_path / "tool.json"
+    file.write_bytes(tool.encode(PEN.with_zero(None)))
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out, "--sensor", "mock:", "--tool", file)
+    run = run_of(out)
+    force = run.stack(schemas.FORCE)
+    assert np.abs(force.mean(axis=0)).max() < 0.05, "the mock's zero of 3.5 N is gone"
+    assert [entry["role"] for entry in run.provenance.inputs] == ["trajectory", "tool"]
+
+
 def test_a_force_over_the_limit_stops_the_run(traj, tmp_path):
     out = tmp_path / "run.parquet"
     options = ("--sensor", "mock:?plate=-15", "--max-force", 10)
@@ -371,6 +386,18 @@ def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_pa
     run = run_of(out)
     assert set(run.columns["phase"]) == {"approach"}
     assert run.columns["coupling"].min() == -5.0
+
+
+def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    out.write_bytes(b"older")
+    request = Request(str(traj), None, str(out), "mock:", None, None, *[False] * 5)
+    with pytest.raises(InputError, match="--force replaces it"):
+        _check_output(request, repeatable=False)
+    _check_output(dataclasses.replace(request, force=True), repeatable=False)
+    assert out.read_bytes() == b"older"
+    execute(traj, "-o", out)
+    assert len(run_of(out)) > 500
 
 
 # --- signals and real time, in a process of its own

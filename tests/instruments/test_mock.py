@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from instrument_conformance import check_sensor, check_servo
 
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.clock import SimulatedClock
@@ -13,6 +12,7 @@ from dmpcli.instruments.mock.parameters import DragTeaching, Sensor, Servo
 from dmpcli.instruments.protocols import DragTeaching as TeachesByDrag
 from dmpcli.primitives import wrench
 from dmpcli.rotations import exp, log
+from tests.instruments.instrument_conformance import check_sensor, check_servo
 
 HOME = np.zeros(3)
 SILENT_NOISE = Sensor(noise=np.zeros(6), drift=np.zeros(6))

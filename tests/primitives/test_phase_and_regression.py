@@ -43,9 +43,7 @@ def test_mean_is_the_normalized_weighted_sum():
     rng = np.random.default_rng(0)
     basis = even_in_time(12, 3.0, 1.5, 1.0)
     s, weights = rng.random((4, 5)), rng.normal(size=(2, 12))
-    np.testing.assert_allclose(
-        basis.mean(s, weights), basis.normalized(s) @ weights.T, rtol=1e-12
-    )
+    np.testing.assert_allclose(basis.mean(s, weights), basis.normalized(s) @ weights.T, rtol=1e-12)
 
 
 def test_lwr_is_the_printed_formula():

@@ -35,9 +35,7 @@ def with_header(columns, **header):
 
 
 @given(
-    st.lists(
-        st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=30
-    )
+    st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=30)
 )
 def test_floats_round_trip_exactly(values):
     x = np.array(values)
@@ -52,7 +50,9 @@ def test_the_same_record_gives_the_same_bytes():
 def test_provenance_round_trips_and_says_frame_and_euler_order():
     found = record.decode(Source("a", record.encode(demonstration())))
     assert found.provenance == demonstration().provenance
-    header = json.loads(pq.read_schema(Source("a", record.encode(found)).open()).metadata[b"dmpcli"])
+    header = json.loads(
+        pq.read_schema(Source("a", record.encode(found)).open()).metadata[b"dmpcli"]
+    )
     assert header["frame"] == "robot base"
     assert "X-Y-Z intrinsic" in header["euler"]
     assert not {"time", "host", "path", "user"} & set(header)

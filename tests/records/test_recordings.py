@@ -61,9 +61,7 @@ def test_columns_and_units_can_be_mapped_one_by_one():
         {"time": "ms", "length": "in", "angle": "deg"},
     )
     degrees = np.stack([170 + 5 * T, 3 * T, -2 * T], axis=1)
-    source = csv(
-        ",", "ms px y z roll pitch yaw", np.column_stack([1000 * T, XYZ / 25.4, degrees])
-    )
+    source = csv(",", "ms px y z roll pitch yaw", np.column_stack([1000 * T, XYZ / 25.4, degrees]))
     found = stroke(source, layout)
     np.testing.assert_allclose(found.t, T, rtol=1e-12)
     np.testing.assert_allclose(found.position, XYZ, rtol=1e-12)

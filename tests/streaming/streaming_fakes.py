@@ -11,7 +11,7 @@ PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
 START = np.array([-551.030, 131.399, -17.560])
 LENGTH, AMPLITUDE = 109.0, 25.0
 
-WIDE = Limits(250.0, 2250.0, 50_000.0, 0.785, 3.5, 78.0)
+WIDE = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
 
 
 def minimum_jerk(s):

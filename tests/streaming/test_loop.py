@@ -229,6 +229,17 @@ def test_an_instrument_that_fails_keeps_the_rows_and_stops_the_arm():
     assert bench.servo.calls[-1] == "stop"
 
 
+def test_an_arm_that_cannot_be_stopped_is_a_failure_with_its_rows():
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    bench = Bench()
+    bench.servo.stop = unreachable
+    outcome = bench.run()
+    assert (outcome.reason, outcome.error) == ("fake: does not answer", InstrumentError)
+    assert len(bench.log.rows) > 500
+
+
 def test_a_defect_is_raised_but_the_arm_is_stopped():
     def defect(servo):
         raise ZeroDivisionError

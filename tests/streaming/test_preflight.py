@@ -137,7 +137,7 @@ def test_end_velocity_is_that_of_the_motion_and_goes_with_the_speed():
     assert start.value == pytest.approx(2.0)
     assert end.value == pytest.approx(2.0 + 3.0 * t[-1])
     assert preflight.at_rest(source, 0.5, 0.02, WIDE)[0].value == pytest.approx(1.0)
-    assert start.limit == pytest.approx(0.1 * 2250.0 * 0.02)
+    assert start.limit == pytest.approx(0.2 * 2250.0 * 0.02)
 
 
 def test_the_arm_must_stand_at_the_start():

@@ -1,0 +1,141 @@
+"""fit at the command line: what it says, writes and refuses."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from dmpcli import cli
+from tests.primitives.strokes import paper_stroke
+
+
+def run(*args):
+    return CliRunner().invoke(cli.app, ["fit", *map(str, args)])
+
+
+@pytest.fixture
+def recording(tmp_path):
+    stroke = paper_stroke()
+    frame = pd.DataFrame(np.column_stack([stroke.t, stroke.position]), columns=list("txyz"))
+    frame.to_csv(tmp_path / "demo.csv", index=False)
+    return tmp_path / "demo.csv"
+
+
+def test_it_prints_reproduction_rms_and_wave_height(recording, tmp_path):
+    done = run(recording, "-o", tmp_path / "s.json")
+    assert done.exit_code == 0
+    assert "reproduction RMS 0.039" in done.stderr
+    assert "wave height 49.979 mm demonstrated, 49.934 mm reproduced" in done.stderr
+    assert done.stdout == ""
+
+
+def test_quiet_says_nothing(recording, tmp_path):
+    assert run(recording, "-o", tmp_path / "s.json", "-q").stderr == ""
+
+
+def test_the_same_input_gives_the_same_bytes_and_no_path_or_time(recording, tmp_path):
+    run(recording, "-o", tmp_path / "a.json")
+    moved = recording.rename(tmp_path / "moved.csv")
+    run(moved, "-o", tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert str(tmp_path) not in (tmp_path / "a.json").read_text()
+
+
+def test_options_beat_the_preset_and_are_kept(recording, tmp_path):
+    run(recording, "-o", tmp_path / "s.json", "--preset", "paper", "--basis", "33")
+    document = json.loads((tmp_path / "s.json").read_text())
+    assert document["basis"] == 33
+    assert document["alpha_1"] == 1.7
+    assert document["options"]["widths"] == "power"
+
+
+def test_the_original_model_says_which_axes_go_without_the_factor(recording, tmp_path):
+    done = run(recording, "-o", tmp_path / "s.json", "--model", "original")
+    assert "g - x0 is nearly zero in z" in done.stderr
+
+
+def test_other_recorders_are_read_by_layout(recording, tmp_path):
+    frame = pd.read_csv(recording)
+    frame[["x", "y", "z"]] /= 1000.0
+    frame.columns = ["timestamp", *(f"actual_TCP_pose_{i}" for i in range(3))]
+    for i in range(3, 6):
+        frame[f"actual_TCP_pose_{i}"] = [3.0, 0.1, 0.0][i - 3]
+    frame.to_csv(tmp_path / "ur.csv", sep=" ", index=False)
+    assert run(tmp_path / "ur.csv", "-o", tmp_path / "ur.json", "--layout", "ur").exit_code == 0
+    a = json.loads((tmp_path / "ur.json").read_text())
+    assert a["task_frame"]["start"][0] == pytest.approx(-551.03, abs=0.01)
+    assert a["options"]["layout"]["length"] == "m"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--basis", "0"], "--basis = 0"),
+        (["--damping", "nan"], "--damping = nan"),
+        (["--tau", "-1"], "--tau = -1.0"),
+        (["--cutoff", "0"], "--cutoff = 0.0"),
+        (["--regression", "magic"], "--regression = 'magic'"),
+        (["--model", "newest"], "--model = 'newest'"),
+        (["--preset", "none"], "--preset none: no such preset"),
+        (["--layout", "kuka"], "--layout kuka: no such layout; there are ur, tum"),
+        (["--map", "x"], "--map x: must be OURS=THEIRS"),
+        (["--map", "x=tool_x"], "column 'tool_x' is missing"),
+        (["--config", "none.toml"], "none.toml: no such file"),
+    ],
+)
+def test_wrong_options_are_refused_by_name_and_touch_nothing(recording, tmp_path, options, message):
+    output = tmp_path / "s.json"
+    output.write_text("old")
+    done = run(recording, "-o", output, *options)
+    assert done.exit_code == 2
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) <= 2
+    assert output.read_text() == "old"
+
+
+def test_outputs_and_inputs_that_cannot_be_are_refused(recording, tmp_path):
+    for args, message in (
+        ([recording, "-o", tmp_path / "no" / "s.json"], "does not exist"),
+        ([recording, "-o", tmp_path], "is a directory"),
+        ([tmp_path, "-o", tmp_path / "s.json"], "is a directory"),
+        ([tmp_path / "none", "-o", tmp_path / "s.json"], "no such file"),
+        (["-", "-", "-o", tmp_path / "s.json"], "standard input can be read only once"),
+    ):
+        done = run(*args)
+        assert done.exit_code == 2
+        assert message in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["demo.csv"]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    row=st.integers(0, 60),
+    column=st.integers(0, 3),
+    cell=st.sampled_from(["nan", "inf", "-inf", "", "left", "1e999", "0x12", "1;2", "--"]),
+)
+def test_any_bad_cell_is_refused_with_its_line_and_column(tmp_path, row, column, cell):
+    stroke = paper_stroke(61)
+    rows = [[repr(float(v)) for v in line] for line in np.column_stack([stroke.t, stroke.position])]
+    rows[row][column] = cell
+    (tmp_path / "bad.csv").write_text("\n".join(["t,x,y,z", *(",".join(r) for r in rows)]))
+    done = run(tmp_path / "bad.csv", "-o", tmp_path / "s.json")
+    assert done.exit_code == 2
+    assert f"bad.csv: column '{'txyz'[column]}', line {row + 2}" in done.stderr
+    assert not (tmp_path / "s.json").exists()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(order=st.permutations(range(12)))
+def test_time_that_repeats_or_runs_backward_is_refused(tmp_path, order):
+    stroke = paper_stroke(12)
+    rows = np.column_stack([stroke.t[list(order)], stroke.position])
+    lines = [",".join(repr(float(v)) for v in row) for row in rows]
+    (tmp_path / "back.csv").write_text("\n".join(["t,x,y,z", *lines]))
+    done = run(tmp_path / "back.csv", "-o", tmp_path / "s.json")
+    ordered = list(order) == sorted(order)
+    assert done.exit_code == (0 if ordered else 2)
+    assert ordered or "time runs backward" in done.stderr

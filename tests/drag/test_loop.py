@@ -1,0 +1,203 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmpcli.drag.loop import Recorder
+from dmpcli.errors import InputError, InstrumentError, RefusedError
+from dmpcli.instruments.clock import SimulatedClock
+from dmpcli.instruments.mock import PEN
+from tests.drag.drag_fakes import FakeSensor, FakeServo, drag_settings
+
+# A sensor in the TCP with nothing on it senses the wrench that moves the tool.
+WEIGHTLESS = replace(PEN, tcp_position=PEN.sensor_position, weight=0.0, zero=np.zeros(6))
+PULL = np.array([5.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+# The recording begins one tenth of a second after the clock's 0: the loop waits for samples first.
+BEGAN = 0.1
+
+
+def bench(longest=2.0, asked_to_end=lambda: False, tool=WEIGHTLESS, clock=None, **options):
+    clock = clock or SimulatedClock()
+    sensor, servo = FakeSensor(clock), FakeServo(clock)
+    recorder = Recorder(servo, sensor, clock, tool, drag_settings(**options), longest, asked_to_end)
+    return recorder, sensor, servo
+
+
+def test_the_recording_lasts_as_long_as_asked_one_row_per_cycle():
+    recorder, sensor, servo = bench(longest=2.0)
+    ending = recorder.run()
+    columns = recorder.log.columns()
+    assert (ending.reason, ending.failure, ending.missed) == ("duration", None, 0)
+    np.testing.assert_array_equal(columns["t"], np.round(np.arange(101) * 0.02, 9))
+    assert servo.calls[0] == "open"
+    assert servo.calls[-2:] == ["stop", "close"]
+    assert sensor.closed == 1
+
+
+def test_a_pull_moves_the_tool_as_the_admittance_says_and_the_file_holds_all():
+    recorder, sensor, _ = bench(longest=4.0, dead_band_force=1.0)
+    sensor.wrench = lambda t: PULL
+    recorder.run()
+    columns = recorder.log.columns()
+    speed = np.gradient(columns["x_ref"], columns["t"])
+    # 4 N past the dead-band, 0.08 N·s/mm.
+    assert speed[-2] == pytest.approx(4.0 / 0.08, rel=1e-3)
+    np.testing.assert_allclose(columns["fx"][-1], 4.0, rtol=1e-6)
+    np.testing.assert_allclose(columns["fx_raw"], 5.0)
+    assert (np.diff(columns["sensor_seq"]) == 2).all()
+    np.testing.assert_allclose(columns["rx"], np.pi, atol=1e-9)
+
+
+def test_the_tool_slows_to_rest_before_the_servo_is_left():
+    recorder, sensor, servo = bench(longest=1.0, acceleration=200.0)
+    sensor.wrench = lambda t: 4 * PULL
+    recorder.run()
+    t = np.array([when for when, _ in servo.sent])
+    speed = np.diff([p[0] for _, p in servo.sent]) / np.diff(t)
+    after = speed[t[1:] > BEGAN + 1.0 + 1e-6]
+    assert len(after) > 10
+    np.testing.assert_allclose(np.diff(after), -200.0 * 0.02, atol=4.1)
+    assert after[-1] == pytest.approx(0.0, abs=4.0)
+
+
+def test_silence_for_two_cycles_brakes_and_for_a_tenth_of_a_second_stops():
+    recorder, sensor, servo = bench(longest=5.0)
+    sensor.wrench = lambda t: PULL
+    sensor.silent = lambda t: t > 1.0
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert "silent" in ending.reason
+    last = servo.sent[-1][0]
+    assert 1.0 < last <= 1.1 + 1e-9
+    # From the third cycle without a sample on, the reference slows down.
+    speeds = np.diff([p[0] for _, p in servo.sent]) / 0.02
+    assert speeds[-1] < 0.2 * speeds.max()
+    assert servo.calls[-2:] == ["stop", "close"]
+    assert len(recorder.log) > 40  # kept
+
+
+def test_one_late_sample_is_forgiven():
+    recorder, sensor, _ = bench(longest=2.0)
+    sensor.wrench = lambda t: PULL
+    sensor.silent = lambda t: 1.0 < t < 1.025
+    assert recorder.run().reason == "duration"
+
+
+@pytest.mark.parametrize(
+    ("wrench", "words"),
+    [
+        (np.array([81.0, 0, 0, 0, 0, 0]), "Fx = 81 is over 80% of its range"),
+        (np.array([0, 0, 0, 0, -85.0, 0]), "Ty = -85 is over 80% of its range"),
+    ],
+)
+def test_a_reading_near_the_end_of_the_range_stops(wrench, words):
+    recorder, sensor, servo = bench()
+    sensor.wrench = lambda t: wrench if t > 1.0 else np.zeros(6)
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert words in ending.reason
+    assert servo.sent[-1][0] <= 1.02
+
+
+def test_an_unhealthy_sample_stops():
+    recorder, sensor, _ = bench()
+    sensor.healthy = False
+    with pytest.raises(InstrumentError, match="faulty"):
+        recorder.run()
+
+
+@pytest.mark.parametrize("mode", ["emergency stop", "protective stop", "fault", "stopped"])
+def test_a_robot_that_is_not_ready_is_not_started(mode):
+    recorder, _, servo = bench()
+    servo.mode = mode
+    with pytest.raises(RefusedError, match=mode):
+        recorder.run()
+    assert "start" not in servo.calls
+    assert not servo.sent
+    assert servo.calls[-1] == "close"
+
+
+def test_an_emergency_stop_on_the_way_ends_the_recording_and_keeps_it():
+    recorder, _, servo = bench()
+    servo.mode = lambda t: "ready" if t < 1.0 else "emergency stop"
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert len(recorder.log) == 45
+    assert "stop" in servo.calls
+
+
+def test_a_refused_set_point_ends_the_recording():
+    recorder, _, servo = bench()
+    servo.accepts = lambda t: t < 1.0
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert "refused a set-point" in ending.reason
+
+
+def test_a_sensor_that_never_speaks_is_named_before_anything_moves():
+    recorder, sensor, servo = bench()
+    sensor.silent = lambda t: True
+    with pytest.raises(InstrumentError, match="sends nothing"):
+        recorder.run()
+    assert not servo.sent
+    assert sensor.closed == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"control_rate": 5.0}, "control_rate = 5 Hz: the fake robot takes 10 to 500"),
+        ({"sensor_rate": 2000.0}, "sensor_rate = 2000 Hz: the fake sensor sends at most 1000"),
+    ],
+)
+def test_rates_that_the_instruments_do_not_take_are_refused(options, words):
+    recorder, _, servo = bench(**options)
+    with pytest.raises(InputError, match=words):
+        recorder.run()
+    assert not servo.sent
+
+
+def test_asking_ends_the_recording():
+    left = iter([False] * 30 + [True])
+    recorder, _, _ = bench(longest=np.inf, asked_to_end=lambda: next(left))
+    assert recorder.run().reason == "asked"
+    assert len(recorder.log) == 31
+
+
+def test_until_rest_waits_for_motion_and_then_for_rest():
+    recorder, sensor, _ = bench(longest=20.0, until_rest=0.6)
+    sensor.wrench = lambda t: PULL if 3.0 < t < 4.0 else np.zeros(6)
+    assert recorder.run().reason == "rest"
+    # Coasting takes a few M/D = 62 ms; then 0.6 s of rest.
+    assert 4.5 < BEGAN + recorder.log.duration < 5.2
+
+
+def test_until_rest_does_not_end_before_the_tool_has_moved():
+    recorder, _, _ = bench(longest=3.0, until_rest=0.5)
+    assert recorder.run().reason == "duration"
+
+
+def test_the_zero_is_taken_at_rest_where_the_tool_has_none():
+    zero = np.array([3.0, -2.0, 1.0, 0.1, 0.2, -0.3])
+    recorder, sensor, servo = bench(tool=replace(WEIGHTLESS, zero=None), bias_time=0.4)
+    sensor.wrench = lambda t: zero
+    recorder.run()
+    np.testing.assert_allclose(servo.position, 0.0, atol=1e-9)
+    np.testing.assert_allclose(recorder.log.columns()["fx"], 0.0, atol=1e-9)
+
+
+def test_a_late_loop_skips_cycles_and_never_sends_a_burst():
+    class Oversleeping(SimulatedClock):
+        def sleep_until(self, t):
+            super().sleep_until(t + (0.07 if 1.01 < t < 1.03 else 0.0))
+
+    recorder, _, servo = bench(longest=2.0, clock=Oversleeping())
+    ending = recorder.run()
+    assert ending.missed == 3
+    assert np.diff([t for t, _ in servo.sent]).min() > 0.009
+
+
+def test_a_robot_without_drag_teaching_cannot_be_dragged_by_its_own():
+    recorder, _, _ = bench(drag="builtin")
+    with pytest.raises(InputError, match="no drag teaching"):
+        recorder.run()

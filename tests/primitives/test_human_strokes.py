@@ -1,0 +1,70 @@
+"""Real human handwriting: all 210 strokes of the LASA set must fit and generalize."""
+
+import numpy as np
+import pytest
+
+from dmpcli.measures.deviation import nearest_rms
+from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.learning import fit
+from dmpcli.primitives.preparation import Choices
+from dmpcli.surfaces.plane import extent
+from tests.human_strokes import shapes, strokes
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def draw_at(skill, start, goal, duration=None):
+    pairs = Pairs(np.array([start], dtype=float), np.array([goal], dtype=float))
+    seconds = np.array([duration or skill.duration])
+    return draw(skill, pairs, seconds, skill.frame.normal, Style(rate=100.0))[0]
+
+
+@pytest.mark.parametrize("shape", shapes())
+@pytest.mark.parametrize(("regression", "percent"), [("lwr", 0.12), ("ridge", 0.03)])
+def test_reproduction_stays_within_the_promised_share_of_the_diagonal(shape, regression, percent):
+    for stroke in strokes(shape):
+        result = fit([stroke], Choices(regression=regression, trim=False))
+        reproduced = result.reproductions[0].reproduced @ result.skill.frame.axes.T
+        reproduced += result.skill.frame.start
+        error = nearest_rms(reproduced, stroke.position) / extent(stroke.position)
+        assert 100 * error <= percent
+
+
+@pytest.mark.parametrize("shape", shapes())
+def test_new_pairs_keep_the_shape(shape):
+    for stroke in strokes(shape):
+        skill = fit([stroke], Choices()).skill
+        size = extent(stroke.position)
+        angle, length = 1.2, skill.frame.length
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        offset = np.zeros(3)
+        offset[:2] = turn @ (skill.frame.goal - skill.frame.start)[:2]
+        here = draw_at(skill, skill.frame.start, skill.frame.goal)
+        there = draw_at(skill, [300, -200, 40], np.array([300, -200, 40]) + offset)
+        moved = here.position - skill.frame.start
+        if not skill.closed:  # a closed stroke keeps the base axes
+            moved[:, :2] = moved[:, :2] @ turn.T
+            assert np.abs(there.position - [300, -200, 40] - moved).max() < 1e-6 * size
+        for factor in (0.01, 0.5, 3.0):
+            goal = np.array([0.6, 0.8, 0.0]) * length * factor
+            drawn = draw_at(skill, [0, 0, 0], goal, duration=2.5)
+            assert np.all(np.isfinite(drawn.position))
+            assert np.linalg.norm(drawn.position[-1] - goal) < 0.02 * size
+            across = drawn.position @ np.cross(drawn.normal, [0.6, 0.8, 0.0])
+            line = (here.position - skill.frame.start) @ skill.frame.axes[:, 1]
+            if not skill.closed:
+                assert np.ptp(across) == pytest.approx(np.ptp(line), abs=0.02 * size)
+            assert extent(drawn.position) < (max(factor, 1.0) + 0.1) * 1.5 * size
+
+
+def test_the_set_holds_what_the_promise_is_about():
+    everything = [stroke for shape in shapes() for stroke in strokes(shape)]
+    assert len(everything) == 210
+    swinging = 0
+    for stroke in everything:
+        offsets = stroke.position - stroke.position[0]
+        u = offsets[-1] / np.linalg.norm(offsets[-1])
+        along = offsets @ u / np.linalg.norm(offsets[-1])
+        swinging += bool(along.min() < -0.05 or along.max() > 1.05)
+    assert swinging >= 50
