@@ -65,14 +65,14 @@ demo: .venv/installed
 # recorded with the mock lab.
 
 STROKES    := reference recorded
-SKILLS     := modified modified-ridge modified-paper original-axis original-distance
-PAIR_1     := --start -551.030 131.399 -17.560 --goal -660.021 130.034 -17.538
+SKILLS     := modified ridge paper axis distance
+PAIR_1     := --reproduce
 PAIR_2     := --start -701.698 132.420 -17.538 --goal -807.597 129.739 -17.518
-FIT_modified          :=
-FIT_modified-ridge    := --regression ridge
-FIT_modified-paper    := --preset paper
-FIT_original-axis     := --preset paper --model original --forcing-scale axis
-FIT_original-distance := --preset paper --model original --forcing-scale distance
+FIT_modified :=
+FIT_ridge    := --regression ridge
+FIT_paper    := --preset paper
+FIT_axis     := --preset paper --model original --forcing-scale axis
+FIT_distance := --preset paper --model original --forcing-scale distance
 R          := $(OUT)/reproduce
 REPORTS    := $(STROKES:%=$(R)/%/report/report.json)
 
