@@ -7,6 +7,10 @@ import numpy as np
 from dmpcli.arrays import Floats
 
 
+# A shorter soft start, s, is none: no servo has such a period, and t / ease would overflow.
+_SHORTEST_EASE = 1e-9
+
+
 @dataclass(frozen=True)
 class Timing:
     """The sample times of one trajectory and the stroke time that each shows.
@@ -73,7 +77,7 @@ def timing(
 
 def _eased(t: Floats, ease: float) -> Floats:
     """Integral over time of a rate that rises smoothly from 0 to 1 in `ease` seconds."""
-    if ease == 0.0:
+    if ease < _SHORTEST_EASE:
         return np.array(t, dtype=float)
     r = np.clip(t / ease, 0.0, 1.0)
     risen: Floats = ease * (r**6 - 3.0 * r**5 + 2.5 * r**4)

@@ -301,7 +301,8 @@ def _nulls(values: Any) -> Booleans:
         return np.zeros(len(values), dtype=bool)
     bits = np.frombuffer(values.buffers()[0], dtype=np.uint8)
     known = np.unpackbits(bits, bitorder="little")[values.offset : values.offset + len(values)]
-    return known == 0
+    nulls: Booleans = known == 0
+    return nulls
 
 
 def _numbers(values: Any) -> AnyArray:
