@@ -14,7 +14,7 @@ OUT    := out
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test lint bench samples schemas clean
+.PHONY: help demo reproduce test lint bench samples pictures schemas clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -38,6 +38,7 @@ lint: .venv/installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+bench: export OPENBLAS_NUM_THREADS := 1
 bench: .venv/installed
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/accuracy.py
@@ -57,8 +58,10 @@ demo: .venv/installed
 	$(DMPCLI) execute $(DEMO)/trajectory.parquet -o $(DEMO)/run.parquet
 	$(DMPCLI) report $(DEMO)/demonstration.parquet $(DEMO)/trajectory.parquet $(DEMO)/run.parquet \
 	    -o $(DEMO)/report
+	$(DMPCLI) generalize $(DEMO)/skill.json -o $(DEMO)/batch --pairs sample_runs/pairs.csv
+	$(DMPCLI) report $(DEMO)/demonstration.parquet $(DEMO)/batch -o $(DEMO)/batch-report
 	@$(MAKE) --no-print-directory reproduce
-	@echo "Figures: $(DEMO)/report and $(OUT)/reproduce/*/report"
+	@printf '\nFigures: %s\n' "$(DEMO)/report, $(DEMO)/batch-report and $(R)/*/report"
 
 # The paper's flat experiments (section 3.2.1): Tables 1 and 2, Figures 5 to 8; and the drag
 # comparison of Figures 3 and 4. Twice: from the noise-free reference stroke, and from a stroke
@@ -107,6 +110,18 @@ $(R)/drag/builtin.parquet: sample_runs/recorded.toml | .venv/installed
 	$(DMPCLI) record -o $@ --config $< --drag builtin --seed 1
 $(R)/drag/report/report.json: sample_runs/recorded.parquet $(R)/drag/builtin.parquet
 	$(DMPCLI) report $^ -o $(@D) > $(R)/drag/tables.txt
+
+# The README's pictures.
+
+pictures: reproduce
+	@mkdir -p docs/images
+	$(DMPCLI) generalize $(R)/reference/modified.json -o $(R)/star --pairs sample_runs/pairs.csv
+	$(DMPCLI) report sample_runs/reference.parquet $(R)/star -o $(R)/star-report -q > $(R)/star.txt
+	cp $(R)/star-report/fig8_generalization_plane.png docs/images/one_stroke_many_places.png
+	$(DMPCLI) report sample_runs/reference.parquet $(R)/reference/paper-table2.parquet \
+	    $(R)/reference/distance-table2.parquet -o $(R)/table2-report -q > $(R)/table2.txt
+	cp $(R)/table2-report/fig8_generalization_plane.png docs/images/table2.png
+	cp $(R)/drag/report/fig4_drag_plane.png docs/images/drag.png
 
 # The sample runs are kept in the repository; this makes them again, byte for byte.
 

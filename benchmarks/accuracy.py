@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.measures.paper import EXPERIMENTS, REPRODUCTION
+from dmpcli.measures.paper import EXPERIMENTS, REPRODUCTION, Experiment
 from dmpcli.measures.wave import stroke_wave
 from dmpcli.primitives import references
 from dmpcli.primitives.drawing import Style, draw
@@ -40,9 +40,10 @@ def reference() -> Stroke:
     return Stroke(t, position, down)
 
 
-def height(position: Floats, normal: Floats) -> float:
-    """Return the wave height of a stroke, mm; 0 where there is none."""
-    return stroke_wave(position, position[0], position[-1], normal).mean or 0.0
+def height(position: Floats, experiment: Experiment, normal: Floats) -> float:
+    """Return the wave height across the line of an experiment, mm; 0 where there is none."""
+    start, goal = np.array(experiment.start), np.array(experiment.goal)
+    return stroke_wave(position, start, goal, normal).mean or 0.0
 
 
 def against_solve_ivp(skill: Skill) -> float:
@@ -79,7 +80,7 @@ def main() -> None:
     stroke = reference()
     print("| noise-free stroke, mm | RMS | end | Table 1 | Table 2 | roll-out − solve_ivp |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
-    demonstrated = height(stroke.position, np.array([0.0, 0.0, 1.0]))
+    demonstrated = height(stroke.position, REPRODUCTION, np.array([0.0, 0.0, 1.0]))
     print(f"| demonstration | | | {demonstrated:.3f} | {demonstrated:.3f} | |")
     for name, choices in ROWS.items():
         result = fit([stroke], choices)
@@ -90,7 +91,7 @@ def main() -> None:
             drawn = draw(result.skill, pairs, np.array([10.0]), result.skill.frame.normal, Style())[
                 0
             ]
-            heights.append(height(drawn.position, drawn.normal))
+            heights.append(height(drawn.position, experiment, drawn.normal))
         print(
             f"| {name} | {r.rms:.5f} | {r.end:.5f} | {heights[0]:.3f} | {heights[1]:.3f} "
             f"| {against_solve_ivp(result.skill):.1e} |"

@@ -1,5 +1,6 @@
 """The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
 
+import os
 import sys
 from typing import Annotated, Any
 
@@ -57,4 +58,7 @@ def options(
 
 def main() -> None:
     """Console entry point."""
+    # Before numpy is loaded: with more threads the last bits of a product depend on the number of
+    # cores, and these matrices are too small to gain from them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app()

@@ -165,7 +165,9 @@ def _summary(output: str, names: list[str], result: "Fit") -> str:
             f"end {r.end:.4f}; smoothing ({prepared.cutoff:.2f} Hz) took off "
             f"{prepared.removed:.4f} mm RMS; trimmed {before:.2f} s and {after:.2f} s"
         )
-        demonstrated, reproduced = (_wave_height(x) for x in (r.demonstrated, r.reproduced))
+        demonstrated, reproduced = (
+            _wave_height(x, r.demonstrated) for x in (r.demonstrated, r.reproduced)
+        )
         if not skill.closed and demonstrated is not None and reproduced is not None:
             lines.append(
                 f"  wave height {demonstrated:.3f} mm demonstrated, {reproduced:.3f} mm reproduced"
@@ -173,10 +175,10 @@ def _summary(output: str, names: list[str], result: "Fit") -> str:
     return "\n".join(lines)
 
 
-def _wave_height(chart: "Floats") -> float | None:
-    """Return the mean wave height of a stroke in chart coordinates; None for a line."""
+def _wave_height(chart: "Floats", demonstrated: "Floats") -> float | None:
+    """Return the mean wave height across the demonstrated start-goal line; None for a line."""
     import numpy as np
 
     from dmpcli.measures.wave import stroke_wave
 
-    return stroke_wave(chart, chart[0], chart[-1], np.array([0.0, 0.0, 1.0])).mean
+    return stroke_wave(chart, demonstrated[0], demonstrated[-1], np.array([0.0, 0.0, 1.0])).mean

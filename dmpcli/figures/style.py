@@ -18,13 +18,14 @@ class Style:
     order: int = 3
 
 
+# What good curves lie upon is drawn wider and first, so that it stays in sight beneath them.
 STYLES = {
-    "reference": Style("reference", "#D40000", "-", 1.0, 2),
-    "demonstration": Style("demonstration", "#000000", "-", 1.4, 3),
+    "reference": Style("reference", "#D40000", "-", 3.6, 2),
+    "demonstration": Style("demonstration", "#000000", "-", 2.2, 3),
     "builtin": Style("built-in drag", "#0072B2", (0, (6, 1.5)), 1.4, 3),
     "original axis": Style("original DMP", "#009E73", "--", 1.6, 4),
     "original distance": Style("original DMP by distance", "#009E73", "-.", 1.6, 4),
-    "modified": Style("modified DMP", "#E69F00", "-", 1.6, 5),
+    "modified": Style("modified DMP", "#E69F00", "-", 1.2, 5),
     "run": Style("run, actual", "#9A4F96", (0, (1, 1)), 1.6, 6),
 }
 

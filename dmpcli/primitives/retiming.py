@@ -6,7 +6,6 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 
-
 # A shorter soft start, s, is none: no servo has such a period, and t / ease would overflow.
 _SHORTEST_EASE = 1e-9
 

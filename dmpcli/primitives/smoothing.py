@@ -4,6 +4,7 @@ The zero-phase low-pass and the spline are scipy's.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -91,12 +92,20 @@ def low_pass(x: Floats, rate: float, cutoff: float | None) -> Floats:
     """
     if cutoff is None or cutoff >= 0.5 * rate:
         return x
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
-    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
     # The longest settling time that the recording allows keeps its ends where they are.
     settling = int(np.ceil(3.0 * rate / cutoff))
-    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 1, settling)))
+    padding = min(len(x) - 1, settling)
+    return np.asarray(sosfiltfilt(_butterworth(cutoff / rate), x, axis=0, padlen=padding))
+
+
+@lru_cache(maxsize=8)
+def _butterworth(cutoff: float) -> Floats:
+    """Second-order sections of the low-pass; `cutoff` in samples⁻¹."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(_ORDER, cutoff, fs=1.0, output="sos"))
 
 
 def differentiated(t: Floats, x: Floats) -> Signal:

@@ -29,7 +29,7 @@ def test_it_prints_reproduction_rms_and_wave_height(recording, tmp_path):
     done = run(recording, "-o", tmp_path / "s.json")
     assert done.exit_code == 0
     assert "reproduction RMS 0.039" in done.stderr
-    assert "wave height 49.979 mm demonstrated, 49.934 mm reproduced" in done.stderr
+    assert "wave height 49.979 mm demonstrated, 49.935 mm reproduced" in done.stderr
     assert done.stdout == ""
 
 
