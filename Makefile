@@ -79,7 +79,7 @@ FIT_distance := --preset paper --model original --forcing-scale distance
 R          := $(OUT)/reproduce
 REPORTS    := $(STROKES:%=$(R)/%/report/report.json)
 
-reproduce: $(REPORTS) $(R)/drag/report/report.json
+reproduce: $(REPORTS) $(STROKES:%=$(R)/%/tables.txt) $(R)/drag/report/report.json $(R)/drag/tables.txt
 	@for stroke in $(STROKES); do \
 	    printf '\n== Tables 1 and 2 from the %s stroke ==\n' $$stroke; \
 	    cat $(R)/$$stroke/tables.txt; \
@@ -99,17 +99,18 @@ endef
 $(foreach stroke,$(STROKES),$(foreach skill,$(SKILLS),$(eval $(call FIT_RULES,$(stroke),$(skill)))))
 
 define REPORT_RULE
-$(R)/$(1)/report/report.json: sample_runs/$(1).parquet \
+$(R)/$(1)/report/report.json $(R)/$(1)/tables.txt &: sample_runs/$(1).parquet \
     $(foreach t,1 2,$(SKILLS:%=$(R)/$(1)/%-table$(t).parquet))
-	$(DMPCLI) report $$^ -o $$(@D) > $(R)/$(1)/tables.txt
+	$(DMPCLI) report $$^ -o $(R)/$(1)/report > $(R)/$(1)/tables.txt
 endef
 $(foreach stroke,$(STROKES),$(eval $(call REPORT_RULE,$(stroke))))
 
 $(R)/drag/builtin.parquet: sample_runs/recorded.toml | .venv/installed
 	@mkdir -p $(@D)
 	$(DMPCLI) record -o $@ --config $< --drag builtin --seed 1
-$(R)/drag/report/report.json: sample_runs/recorded.parquet $(R)/drag/builtin.parquet
-	$(DMPCLI) report $^ -o $(@D) > $(R)/drag/tables.txt
+$(R)/drag/report/report.json $(R)/drag/tables.txt &: sample_runs/recorded.parquet \
+    $(R)/drag/builtin.parquet
+	$(DMPCLI) report $^ -o $(R)/drag/report > $(R)/drag/tables.txt
 
 # The README's pictures.
 

@@ -1,6 +1,7 @@
 """The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
 
 import os
+import signal
 import sys
 from typing import Annotated, Any
 
@@ -22,6 +23,10 @@ class Group(TyperGroup):
         except DmpError as error:
             print(f"dmpcli: {error}", file=sys.stderr)  # noqa: T201
             sys.exit(error.exit_code)
+        except BrokenPipeError:
+            # The reader has gone; Python would say so once more at its end.
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            sys.exit(128 + signal.SIGPIPE)
 
 
 app = typer.Typer(
@@ -61,4 +66,6 @@ def main() -> None:
     # Before numpy is loaded: with more threads the last bits of a product depend on the number of
     # cores, and these matrices are too small to gain from them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # By default Python ends without cleaning up; half-written files would stay.
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     app()

@@ -28,7 +28,14 @@ def main() -> None:
     columns = {"t": t} | {name: position[:, i] for i, name in enumerate("xyz")}
     columns |= {"rx": np.full(len(t), np.pi), "ry": np.zeros(len(t)), "rz": np.zeros(len(t))}
     options = {"reference": "sine", "wave_height": WAVE_HEIGHT, "duration": DURATION}
-    facts = {"simulated": True, "reference": {"kind": "sine"}, "noise_free": True}
+    reference = {
+        "shape": "sine",
+        "start": start.tolist(),
+        "goal": goal.tolist(),
+        "wave_height": WAVE_HEIGHT,
+        "periods": 1.0,
+    }
+    facts = {"simulated": True, "reference": reference, "noise_free": True}
     provenance = Provenance("make_reference.py", options, facts=facts)
     streams.write(sys.argv[1], record.encode(Record(schemas.DEMONSTRATION, columns, provenance)))
 

@@ -218,20 +218,13 @@ def _loop(
     tool_file: "Source | None",
 ) -> "Loop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
-    from dmpcli.drag.compensation import Compensation, rest_zero
     from dmpcli.streaming import session
-    from dmpcli.streaming.contact import Sensing, at_rest
     from dmpcli.streaming.loop import Loop
 
     touch = None
     if request.sensor is not None:
         tool = _tool(bench, tool_file)
-        session.start(bench.sensor)
-        samples = at_rest(bench.sensor, arm.clock, long=tool.zero is None)
-        if tool.zero is None:
-            tool = tool.with_zero(rest_zero(tool, samples, plan.rotation[0]))
-        sensing = Sensing(bench.sensor, Compensation(tool), samples[-1])
-        touch = session.touch(sensing, plan, settings, coupling)
+        touch = session.touch(bench.sensor, tool, plan, settings, arm.clock, coupling)
     return Loop(plan, settings.limits, session.watch(settings), arm, touch)
 
 
@@ -277,9 +270,9 @@ def _provenance(
 def _stream(loop: "Loop", provenance: "Provenance", request: Request, realtime: bool) -> "Outcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.commands.messages import tell
+    from dmpcli.instruments.interruption import Interruption
     from dmpcli.records import record, streams
     from dmpcli.streaming import session
-    from dmpcli.streaming.interruption import Interruption
     from dmpcli.streaming.loop import Outcome
 
     outcome = Outcome("a defect of dmpcli")

@@ -13,16 +13,24 @@ if TYPE_CHECKING:
     from dmpcli.records.recordings import Layout
 
 
+POOR = 0.05
+"""Share of a stroke's extent beyond which an RMS deviation is worth a warning."""
+
+
 def command(
     demonstrations: Annotated[
         list[Path],
         typer.Argument(
+            metavar="DEMONSTRATION...",
             help="Recordings: ours, or any CSV or Parquet with t, x, y, z; - is standard input.",
             show_default=False,
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Skill file (JSON).", show_default=False)
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="SKILL", help="Skill file (JSON).", show_default=False
+        ),
     ],
     model: Annotated[
         str | None, typer.Option(help="modified (eq. 9-11) or original (eq. 4-8).")
@@ -74,6 +82,8 @@ def command(
     from dmpcli.records.record import Provenance
     from dmpcli.records.settings import resolve
 
+    if forcing_scale is not None and model == "modified":
+        raise InputError("--forcing-scale: belongs to --model original; leave it out")
     settings = resolve(
         FitSettings,
         "fit",
@@ -119,7 +129,22 @@ def command(
     streams.write(
         output, skill.encode(result.skill, reproduction, Provenance("fit", options, inputs))
     )
-    tell(_summary(str(output), [s.name for s in sources], result), quiet)
+    name = streams.shown(output, output=True)
+    tell(_summary(name, [s.name for s in sources], result), quiet)
+    _caution([s.name for s in sources], result)
+
+
+def _caution(names: list[str], result: "Fit") -> None:
+    """Say it where the skill is not the stroke that was demonstrated."""
+    from dmpcli.commands.messages import warn
+    from dmpcli.surfaces.plane import extent
+
+    for name, prepared, r in zip(names, result.prepared, result.reproductions, strict=True):
+        size = extent(prepared.stroke.position)
+        if prepared.removed > POOR * size:
+            warn(f"{name}: smoothing took off much of the stroke; raise --cutoff")
+        if r.rms > POOR * size:
+            warn(f"{name}: the skill does not give this stroke back; see --basis and --alpha-1")
 
 
 def _layout(

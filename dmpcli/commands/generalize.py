@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 PAIRS_PER_PART = 2000
 
+SHOWN = 20
+"""Bad pairs that are named on the terminal; all are in the dataset's table."""
+
 Point = tuple[float, float, float]
 
 
@@ -68,8 +71,12 @@ def command(
         float | None, typer.Option(help="How far start and goal may lie off the surface, mm (1).")
     ] = None,
     on_error: Annotated[
-        str, typer.Option(help="A bad pair stops all before anything is written, or is skipped.")
-    ] = "stop",
+        str | None,
+        typer.Option(
+            metavar="stop|skip",
+            help="A bad pair stops all before anything is written (default), or is skipped.",
+        ),
+    ] = None,
     preset: Annotated[
         str | None, typer.Option(help="TOML file with a [generalize] section.")
     ] = None,
@@ -99,19 +106,27 @@ def command(
         preset,
         config,
     )
+    if on_error is not None and pairs is None:
+        raise InputError("--on-error: belongs to --pairs; leave it out")
+    on_error = on_error or "stop"
     if on_error not in ("stop", "skip"):
         raise InputError(f"--on-error {on_error}: must be stop or skip")
+    if pairs is not None and (start_orientation or goal_orientation):
+        raise InputError(
+            "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
+            "--start-orientation and --goal-orientation out"
+        )
     _check_destination(output, start, goal, pairs, reproduce)
     source = streams.read(skill)
     learned, _ = skill_file.decode(source)
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
-    given = None
+    plane = None
     if surface is not None:
         surface_source = streams.read(surface)
-        given = _facing(plane_file.decode(surface_source), learned, str(surface), quiet)
         inputs.append({"role": "surface", "sha256": surface_source.sha256})
+        plane = plane_file.decode(surface_source)
     options = settings.model_dump()
     if pairs is None:
         assert start is not None
@@ -125,7 +140,10 @@ def command(
         table = pair_file.read(pairs_source)
         inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
         options["on_error"] = on_error
-    _check_orientations(learned, table)
+    _check_asked(learned, table, settings)
+    given = None
+    if plane is not None:
+        given = _facing(plane, learned, table, str(surface), quiet)
     _judge(learned, table, given, settings, on_error)
     provenance = Provenance("generalize", options, tuple(inputs))
     if pairs is None:
@@ -137,8 +155,9 @@ def command(
 def _check_destination(
     output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
 ) -> None:
-    from dmpcli.commands.options import finite
-    from dmpcli.records import streams
+    from dmpcli.commands.options import within
+    from dmpcli.records import record, streams
+    from dmpcli.records.pairs import FARTHEST
 
     if reproduce:
         if any(given is not None for given in (start, goal, pairs)):
@@ -150,13 +169,18 @@ def _check_destination(
             raise InputError(
                 "give --start X Y Z and --goal X Y Z, --reproduce, or a table with --pairs"
             )
-        finite("--start", start)
-        finite("--goal", goal)
+        within("--start", start, FARTHEST)
+        within("--goal", goal, FARTHEST)
         streams.check_writable(output)
         return
     if start is not None or goal is not None:
         raise InputError("--pairs names the starts and goals; leave --start and --goal out")
     streams.check_folder(output)
+    foreign = record.foreign_parts(output)
+    if foreign:
+        raise InputError(
+            f"{output}: holds {foreign[0]}, which is not of dmpcli; choose another folder"
+        )
 
 
 def _one_pair(
@@ -165,14 +189,14 @@ def _one_pair(
     import numpy as np
 
     from dmpcli import rotations
-    from dmpcli.commands.options import finite
+    from dmpcli.commands.options import within
     from dmpcli.primitives.generalization import Pairs
-    from dmpcli.records.pairs import OK, PairTable
+    from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
 
     def rotation(name: str, angles: Point | None) -> Any:
         if angles is None:
             return None
-        finite(name, angles)
+        within(name, angles, LARGEST_ANGLE)
         return rotations.from_euler(np.array([angles]))
 
     return PairTable(
@@ -184,28 +208,39 @@ def _one_pair(
             rotation("--start-orientation", start_orientation),
             rotation("--goal-orientation", goal_orientation),
         ),
+        [""],
         np.array([np.nan]),
         [OK],
     )
 
 
-def _facing(plane: "Plane", skill: "Skill", name: str, quiet: bool) -> "Plane":
+def _facing(plane: "Plane", skill: "Skill", table: "PairTable", name: str, quiet: bool) -> "Plane":
     """Turn the plane's normal to the tool's side, and say so where that flips it."""
     from dmpcli.commands.messages import tell
+    from dmpcli.primitives.admission import tool_axis
 
-    R = skill.frame.rotation
-    facing = plane.facing(None if R is None else R[:, 2])
+    facing = plane.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
     if facing.normal @ plane.normal < 0:
         tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
     return facing
 
 
-def _check_orientations(skill: "Skill", table: "PairTable") -> None:
+def _check_asked(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> None:
+    """Refuse what this skill cannot give, rather than pass over it."""
     asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
     if not skill.oriented and any(rotation is not None for rotation in asked):
         raise InputError(
             f"{table.name}: asks for tool orientations, but the skill was demonstrated without; "
             "leave them out, or fit a demonstration that has them"
+        )
+    if skill.model == "original" and settings.orientation == "surface":
+        raise InputError("--orientation surface: the original DMP knows no surface; leave it out")
+    if skill.model == "original" and settings.amplitude == "scale":
+        raise InputError("--amplitude scale: the original DMP scales by eq. (7); leave it out")
+    if skill.closed and settings.amplitude == "scale":
+        raise InputError(
+            "--amplitude scale: a closed stroke has no start-goal distance to scale with; "
+            "leave it out"
         )
 
 
@@ -232,9 +267,9 @@ def _judge(
         settings.snap_tol,
     )
     for i in np.flatnonzero(~verdict.admitted):
-        table.status[int(rows[i])] = f"pair {table.ids[int(rows[i])]}: " + _reason(
-            verdict, int(i), settings.snap_tol
-        )
+        row = int(rows[i])
+        place = f"{table.places[row]}, pair {table.ids[row]}: " if table.places[row] else ""
+        table.status[row] = place + _reason(verdict, int(i), settings.snap_tol)
     if on_error == "skip":
         return
     upright = {int(rows[i]) for i in np.flatnonzero(verdict.upright)}
@@ -251,6 +286,8 @@ def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings
 
 
 def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
+    from dmpcli.primitives.admission import MOST_SAMPLES
+
     if verdict.coincident[i]:
         return "start and goal are one point, and the stroke is open; set them apart"
     if verdict.short[i]:
@@ -258,6 +295,8 @@ def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
             "--ease-in and --ease-out together are longer than twice the stroke; "
             "shorten them, or give a longer --duration"
         )
+    if verdict.endless[i]:
+        return f"more than {MOST_SAMPLES} samples; shorten --duration or lower --rate"
     if verdict.far[i]:
         return (
             f"start or goal lies {verdict.distance[i]:.3f} mm off the plane, more than "
@@ -286,14 +325,15 @@ def _write_one(
 
     import numpy as np
 
-    from dmpcli.commands.messages import tell
+    from dmpcli.commands.messages import about, tell
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.drawing import draw
     from dmpcli.records import record, streams, trajectory
 
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     duration = _durations(skill, table, settings)
-    stroke = draw(skill, pairs, duration, _normal(skill, given), settings.style())[0]
+    with about("skill"):
+        stroke = draw(skill, pairs, duration, _normal(skill, given), settings.style())[0]
     facts = trajectory.facts_of(skill) | trajectory.facts_of_stroke(
         stroke, settings.rate, pairs.start[0], pairs.goal[0]
     )
@@ -306,7 +346,7 @@ def _write_one(
         )
     miss = np.linalg.norm(stroke.position[-1] - pairs.goal[0])
     tell(
-        f"{output}: {skill.model} DMP, {len(stroke.position)} poses, "
+        f"{streams.shown(output, output=True)}: {skill.model} DMP, {len(stroke.position)} poses, "
         f"{stroke.timing.t[-1]:.3f} s at {settings.rate:g} Hz, ends {miss:.4f} mm from the goal",
         quiet,
     )
@@ -326,42 +366,54 @@ def _write_batch(
 
     import numpy as np
 
-    from dmpcli.commands.messages import progress, tell, warn
+    from dmpcli.commands.messages import about, progress, tell, warn
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.drawing import draw
     from dmpcli.records import record, streams, trajectory
+    from dmpcli.records.pairs import OK
 
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     good = np.flatnonzero(table.good)
     if len(good) == 0:
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
     duration = _durations(skill, table, settings)
+    lasting = duration.copy()
     normal = np.full((len(table), 3), np.nan)
     part_of = [""] * len(table)
     facts = trajectory.facts_of(skill) | {"rate": settings.rate}
-    streams.begin_folder(output)
-    with progress("drawing", len(good), quiet) as advance:
-        for number in range(0, len(good), PAIRS_PER_PART):
-            rows = good[number : number + PAIRS_PER_PART]
-            name = f"part-{number // PAIRS_PER_PART:05d}.parquet"
-            strokes = draw(
-                skill, pairs[rows], duration[rows], _normal(skill, given), settings.style()
-            )
+    with streams.dataset(output) as folder, progress("drawing", len(good), quiet) as advance:
+        for number, first in enumerate(range(0, len(good), PAIRS_PER_PART)):
+            rows = good[first : first + PAIRS_PER_PART]
+            name = f"part-{number:05d}.parquet"
+            with about("skill"):
+                strokes = draw(
+                    skill, pairs[rows], duration[rows], _normal(skill, given), settings.style()
+                )
             for row, stroke in zip(rows, strokes, strict=True):
-                normal[row], duration[row] = stroke.normal, stroke.timing.t[-1]
+                normal[row], lasting[row] = stroke.normal, stroke.timing.t[-1]
                 part_of[row] = name
             done = trajectory.trajectory_record(
                 [table.ids[row] for row in rows], strokes, replace(provenance, facts=facts)
             )
-            streams.write(output / name, record.encode(done))
+            streams.write(folder / name, record.encode(done))
             advance(len(rows))
-    done = trajectory.pairs_record(
-        table.ids, pairs, duration, normal, part_of, table.status, replace(provenance, facts=facts)
-    )
-    streams.write(output / "pairs.parquet", record.encode(done))
-    for status in table.status:
-        if status != "ok":
-            warn(f"{table.name}: skipped: {status}")
+        done = trajectory.pairs_record(
+            table.ids,
+            pairs,
+            lasting,
+            normal,
+            part_of,
+            table.status,
+            replace(provenance, facts=facts),
+        )
+        streams.write(folder / streams.TABLE, record.encode(done))
+    bad = [status for status in table.status if status != OK]
+    for status in bad[:SHOWN]:
+        tell(f"{table.name}: skipped: {status}", quiet)
+    if len(bad) > SHOWN:
+        tell(
+            f"{table.name}: and {len(bad) - SHOWN} more; {output}/{streams.TABLE} names all", quiet
+        )
     skipped = len(table) - len(good)
     summary = f"{output}: {len(good)} strokes drawn, {skipped} pairs skipped"
     if skipped:

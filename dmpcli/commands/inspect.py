@@ -1,12 +1,13 @@
 """``dmpcli inspect``: what a file is."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from dmpcli.errors import InputError
 
-_WIDTH = 100
+_WIDTH = 80
 
 
 def command(
@@ -20,23 +21,23 @@ def command(
     ] = None,
     schema: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Print the JSON Schema of skill or plane files instead."),
+        typer.Option(
+            metavar="NAME", help="Print the JSON Schema of skill, plane or tool files instead."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
-    import sys
-
     from dmpcli.figures import inspection
     from dmpcli.records import streams
 
     if schema is not None:
-        sys.stdout.buffer.write(inspection.json_schema(schema))
+        streams.say(inspection.json_schema(schema))
         return
     if file is None:
         raise InputError("FILE is missing: name a file, or - for standard input")
+    if Path(file).is_dir() and (Path(file) / streams.TABLE).is_file():
+        file = str(Path(file) / streams.TABLE)
     found = inspection.inspected(streams.read(file))
-    if as_json:
-        sys.stdout.buffer.write(inspection.as_json(found))
-    else:
-        sys.stdout.buffer.write(inspection.as_text(found, _WIDTH).encode())
+    text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
+    streams.say(text)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dmpcli.errors import InputError
 
 
-def finite(option: str, values: Sequence[float]) -> None:
-    """Refuse NaN and infinity, which the option parser lets pass.
+def within(option: str, values: Sequence[float], largest: float) -> None:
+    """Refuse NaN and infinity, which the option parser lets pass, and numbers beyond all sense.
 
     Raises
     ------
@@ -17,3 +17,5 @@ def finite(option: str, values: Sequence[float]) -> None:
     for value in values:
         if not math.isfinite(value):
             raise InputError(f"{option}: {value} is not a finite number")
+        if abs(value) > largest:
+            raise InputError(f"{option}: {value:g} is beyond {largest:g}; check its unit")

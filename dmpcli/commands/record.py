@@ -62,11 +62,11 @@ def command(
     from dmpcli.drag.settings import RecordSettings, check
     from dmpcli.instruments import urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
+    from dmpcli.instruments.interruption import Interruption
     from dmpcli.instruments.mock import PEN
     from dmpcli.records import settings as layers
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
-    from dmpcli.streaming.interruption import Interruption
 
     given = {
         "drag": drag,

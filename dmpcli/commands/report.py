@@ -41,26 +41,26 @@ def command(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No messages.")] = False,
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
-    import sys
-
     from dmpcli.commands.messages import tell
     from dmpcli.figures import document, stroke
+    from dmpcli.records import streams
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
-    if output is not None:
-        _check_folder(output)
+    if output is not None and output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is a file, -o needs the name of a folder")
     normal = None if surface is None else _normal(surface)
     labels = stroke.labels_of(files)
     parts = [_part(name, label, normal) for name, label in zip(files, labels, strict=True)]
     report = document.document(parts)
     if output is not None:
+        _make_folder(output)
         written = _write(output, report, parts)
         tell(f"{output}: wrote {', '.join(written)}", quiet)
     if as_json:
-        sys.stdout.buffer.write(document.as_json(report))
+        streams.say(document.as_json(report))
     else:
-        sys.stdout.write(document.as_text(report, _width()))
+        streams.say(document.as_text(report, _width()).encode())
 
 
 def _part(name: str, label: str, normal: "Floats | None") -> "Part":
@@ -112,8 +112,8 @@ def _normal(surface: Path) -> "Floats":
     return plane.decode(streams.read(surface)).normal
 
 
-def _check_folder(output: Path) -> None:
-    """Make the folder of the report, or say why not, before any work is done."""
+def _make_folder(output: Path) -> None:
+    """Make the folder of the report, or say why not."""
     try:
         output.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
@@ -134,6 +134,10 @@ def _write(output: Path, report: "Row", parts: "list[Part]") -> list[str]:
         "wave_heights.csv": document.as_csv(parts),
         **gallery(strokes),
     }
+    # Figures of an earlier report that this one does not draw would be taken for its own.
+    for old in output.glob("fig[0-9]_*.*"):
+        if old.name not in files:
+            old.unlink()
     for name, content in files.items():
         streams.write(output / name, content)
     return list(files)
@@ -144,4 +148,4 @@ def _width() -> int:
     import shutil
     import sys
 
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else _WIDTH
+    return max(shutil.get_terminal_size().columns, _WIDTH) if sys.stdout.isatty() else _WIDTH

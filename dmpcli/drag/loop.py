@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.drag.compensation import Compensation, LowPass, dead_band, rest_zero
 from dmpcli.drag.log import Log
 from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
@@ -25,6 +24,7 @@ from dmpcli.instruments.protocols import (
     ServoInfo,
 )
 from dmpcli.primitives.admittance import Pose, brake, move
+from dmpcli.primitives.compensation import Compensation, LowPass, dead_band, rest_zero
 from dmpcli.primitives.wrench import Tool
 
 SILENCE = 0.1

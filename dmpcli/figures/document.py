@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rich.table import Table
@@ -99,6 +99,15 @@ def as_csv(parts: Sequence[Part]) -> bytes:
     return sink.getvalue().encode()
 
 
+def _counted(states: Mapping[str, int]) -> str:
+    """Say how many pairs were drawn, and of the others how many and one reason."""
+    drawn = states.get("ok", 0)
+    bad = {status: n for status, n in states.items() if status != "ok"}
+    if not bad:
+        return f"{drawn} drawn"
+    return f"{drawn} drawn, {sum(bad.values())} not; the first: {next(iter(bad))}"
+
+
 def as_text(report: Row, width: int) -> str:
     """Return the document as tables for people, `width` columns wide, without terminal codes."""
     parts: list[Table | str] = []
@@ -111,8 +120,7 @@ def as_text(report: Row, width: int) -> str:
         if entry["statistics"]:
             parts += [tables.statistics(entry["file"], entry), ""]
         if entry["states"]:
-            counted = ", ".join(f"{n} {status}" for status, n in entry["states"].items())
-            parts += [f"{entry['file']}: {counted}", ""]
+            parts += [f"{entry['file']}: {_counted(entry['states'])}", ""]
     runs = [(e["file"], e["deadlines"]) for e in report["files"] if e["deadlines"]]
     if runs:
         parts += [tables.deadlines(runs), ""]

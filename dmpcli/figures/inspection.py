@@ -134,6 +134,8 @@ def _timing(found: record.Record) -> Row:
 def _json(source: Source) -> Row:
     content = skill.json_document(source)
     name, version = content.get("schema"), content.get("version")
+    if not isinstance(name, str):
+        name = None
     if name in _READERS:
         _READERS[name](source)
     ours = name in _MEANINGS

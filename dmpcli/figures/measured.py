@@ -62,7 +62,7 @@ def deadlines_of(run: Record) -> Row:
     off = np.linalg.norm(run.position() - run.position("plan"), axis=1)
     return {
         "period": _finite(period),
-        **asdict(punctuality(lateness, period)),
+        **asdict(punctuality(deadline, lateness, period)),
         "tracking_rms": float(np.sqrt(np.mean(off**2))),
         "tracking_max": float(off.max()),
     }

@@ -16,7 +16,7 @@ class Punctuality:
     median, p99, worst : float
         Lateness after the deadline, s.
     missed : int
-        Cycles whose set-point left a full period late or more: the next one was already due.
+        Deadlines at which nothing was sent, because the loop was still late from one before.
     cycles : int
     """
 
@@ -27,21 +27,24 @@ class Punctuality:
     cycles: int
 
 
-def punctuality(lateness: Floats, period: float) -> Punctuality:
+def punctuality(deadline: Floats, lateness: Floats, period: float) -> Punctuality:
     """Return the deadline statistics of a run.
 
     Parameters
     ----------
+    deadline : array, shape (n,)
+        When each set-point was due, s; the gaps between them are the deadlines that were missed.
     lateness : array, shape (n,)
         How much later than due each set-point was sent, s.
     period : float
         Servo period, s.
     """
     median, p99 = np.quantile(lateness, [0.50, 0.99])
+    due = np.rint(np.diff(deadline) / period)
     return Punctuality(
         float(median),
         float(p99),
         float(np.max(lateness)),
-        int(np.count_nonzero(lateness >= period)),
+        int(np.maximum(due - 1.0, 0.0).sum()),
         len(lateness),
     )

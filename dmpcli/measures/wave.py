@@ -9,7 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 PROMINENCE = 0.10
 """Least prominence of an extremum, as a share of the signal's range."""
 
-LINE = 0.01
+LINE = 0.008
 """A stroke is a line where it swings across by less than this share of the start-goal distance."""
 
 

@@ -14,6 +14,8 @@ from dmpcli.surfaces.plane import Plane
 COINCIDENT = 1e-6
 # Cosine beyond which a start-goal line stands upright on the plane.
 UPRIGHT = 1.0 - 1e-6
+# Samples of one trajectory: more than two hours at 100 Hz.
+MOST_SAMPLES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class Admission:
         The start-goal line stands upright on the plane, so that no chart follows.
     short : array of bool
         The stroke is too short for the soft start and end.
+    endless : array of bool
+        The trajectory would have more than `MOST_SAMPLES` samples.
     distance : array, shape (B,)
         The larger distance of start and goal from the given plane, mm; 0 without one.
     """
@@ -38,12 +42,13 @@ class Admission:
     far: Booleans
     upright: Booleans
     short: Booleans
+    endless: Booleans
     distance: Floats
 
     @property
     def admitted(self) -> Booleans:
         """Pairs that nothing stands against."""
-        return ~(self.coincident | self.far | self.upright | self.short)
+        return ~(self.coincident | self.far | self.upright | self.short | self.endless)
 
 
 def admit(
@@ -85,7 +90,8 @@ def admit(
         along = np.abs(difference @ normal) / np.where(coincident, 1.0, length)
         upright = ~coincident & (along > UPRIGHT)
     short = 2.0 * duration < style.ease_in + style.ease_out
-    return Admission(coincident, distance > tolerance, upright, short, distance)
+    endless = (duration + 0.5 * (style.ease_in + style.ease_out)) * style.rate > MOST_SAMPLES
+    return Admission(coincident, distance > tolerance, upright, short, endless, distance)
 
 
 def snapped(pairs: Pairs, given: Plane) -> Pairs:
@@ -93,3 +99,19 @@ def snapped(pairs: Pairs, given: Plane) -> Pairs:
     start = pairs.start - given.height(pairs.start)[:, None] * given.normal
     goal = pairs.goal - given.height(pairs.goal)[:, None] * given.normal
     return Pairs(start, goal, pairs.start_rotation, pairs.goal_rotation)
+
+
+def tool_axis(skill: Skill, pairs: Pairs) -> Floats | None:
+    """Unit vector along the tool into the work, R e_z: the one asked for, else the demonstrated.
+
+    Returns
+    -------
+    array, shape (3,), or None
+        The mean over the pairs' starts where they ask for orientations; None without any.
+    """
+    if pairs.start_rotation is not None and len(pairs):
+        axis = pairs.start_rotation[:, :, 2].mean(axis=0)
+        length = np.linalg.norm(axis)
+        return axis / length if length > 0 else None
+    R = skill.frame.rotation
+    return None if R is None else R[:, 2]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
 from dmpcli.primitives.generalization import Amplitude, Orientation, Pairs, curves, roll_out
 from dmpcli.primitives.retiming import Timing, timing
 from dmpcli.primitives.skill import Skill
@@ -74,6 +75,11 @@ def draw(
     -------
     list of Stroke
         In the order of the pairs.
+
+    Raises
+    ------
+    InputError
+        The skill's own numbers overflow.
     """
     strokes: list[Stroke | None] = [None] * len(pairs)
     for seconds in np.unique(duration):
@@ -88,9 +94,12 @@ def draw(
             style.ease_out,
         )
         charts = pair_charts(some.start, some.goal, normal, skill.closed)
-        drawn = roll_out(
-            skill, curves(skill, when.stroke), some, charts, style.amplitude, style.orientation
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            drawn = roll_out(
+                skill, curves(skill, when.stroke), some, charts, style.amplitude, style.orientation
+            )
+        if not np.isfinite(drawn.position).all():
+            raise InputError("the skill's numbers give no finite stroke; fit it again")
         for i, row in enumerate(rows):
             euler = None if drawn.euler is None else drawn.euler[i]
             strokes[row] = Stroke(when, drawn.position[i], euler, drawn.normal[i])

@@ -106,11 +106,13 @@ def prepare(stroke: Stroke, choices: Choices) -> Prepared:
     x = np.zeros((len(t), 6))
     x[:, :3] = (position - position[0]) @ C if choices.model == "modified" else position
     first = None
-    if rotation is not None:
-        E = C.T @ rotation @ rotation[0].T @ C
+    if even.rotation is not None and rotation is not None:
+        # Over the whole recording, as the positions: a filter that began at the cut would take the
+        # first sample for the truth.
+        E = C.T @ even.rotation @ rotation[0].T @ C
         angles = smoothing.low_pass(rotations.to_euler_continuous(E), rate, cutoff)
-        E = rotations.from_euler(angles)
-        # Smoothing moves the first sample too; R(0) takes that in, so that E begins with no turn.
+        E = rotations.from_euler(angles[part])
+        # R(0) takes in what smoothing did to the first sample, so that E begins with no turn.
         first = C @ E[0] @ C.T @ rotation[0]
         x[:, 3:] = rotations.to_euler_continuous(E @ E[0].T)
     removed = np.sum((position - even.position[part]) ** 2, axis=1)

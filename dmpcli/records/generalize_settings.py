@@ -8,8 +8,7 @@ from dmpcli.primitives.drawing import Style
 from dmpcli.primitives.generalization import Amplitude, Orientation
 from dmpcli.records.settings import Settings
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+NotNegative = Annotated[float, Field(ge=0, le=86_400)]
 
 
 class GeneralizeSettings(Settings):
@@ -29,8 +28,8 @@ class GeneralizeSettings(Settings):
         How far start and goal may lie off the given surface, mm.
     """
 
-    duration: Annotated[float, Field(gt=0, le=86_400)] | None = None
-    rate: Annotated[float, Field(gt=0, le=10_000)] = 50.0
+    duration: Annotated[float, Field(ge=0.001, le=86_400)] | None = None
+    rate: Annotated[float, Field(ge=0.001, le=10_000)] = 50.0
     amplitude: Amplitude = "keep"
     orientation: Orientation = "keep"
     ease_in: NotNegative = 0.0

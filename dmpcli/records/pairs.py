@@ -18,6 +18,12 @@ START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
 OK = "ok"
 
+FARTHEST = 1e6
+"""Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""
+
+LARGEST_ANGLE = 1e3
+"""Angles beyond this, rad, are a mistake."""
+
 
 @dataclass(frozen=True)
 class PairTable:
@@ -30,6 +36,8 @@ class PairTable:
         Of the ``id`` column, else the row numbers from 1.
     pairs : Pairs
         B pairs; rows whose status is not ``ok`` hold NaN or what they held.
+    places : list of str
+        Where each row stands in the file, as a person counts.
     duration : array, shape (B,)
         s; NaN where the table does not say.
     status : array of str, shape (B,)
@@ -39,6 +47,7 @@ class PairTable:
     name: str
     ids: list[str]
     pairs: Pairs
+    places: list[str]
     duration: Floats
     status: list[str]
 
@@ -79,6 +88,7 @@ def read(source: Source) -> PairTable:
             _rotations(table, START_ANGLES, status),
             _rotations(table, GOAL_ANGLES, status),
         ),
+        [table.at(row) for row in range(len(table))],
         duration,
         status,
     )
@@ -91,6 +101,9 @@ def _three(table: Table, names: tuple[str, ...], status: list[str]) -> Floats:
 def _column(table: Table, name: str, status: list[str]) -> Floats:
     values = table.floats(name)
     _mark(table, status, ~np.isfinite(values), name, "is not a finite number")
+    largest = LARGEST_ANGLE if name.startswith("r") else FARTHEST
+    beyond = np.isfinite(values) & (np.abs(values) > largest)
+    _mark(table, status, beyond, name, f"is beyond {largest:g}; check its unit")
     return values
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dmpcli.errors import InputError
+from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.skill import json_document
 from dmpcli.records.streams import Source
 from dmpcli.surfaces.plane import Plane
@@ -51,11 +52,14 @@ def decode(source: Source) -> Plane:
             f"{source.name}: {where}: {detail['msg']}; a plane is "
             '{"point": [x, y, z], "normal": [nx, ny, nz]} in mm'
         ) from None
-    normal = np.array(file.normal)
-    length = np.linalg.norm(normal)
-    if length < 1e-12:
+    normal, point = np.array(file.normal), np.array(file.point)
+    if np.abs(point).max() > FARTHEST:
+        raise InputError(f"{source.name}: point: is beyond {FARTHEST:g} mm; check its unit")
+    largest = np.abs(normal).max()
+    if largest == 0.0:
         raise InputError(f"{source.name}: normal: is zero; it must point off the plane")
-    return Plane(np.array(file.point), normal / length)
+    normal = normal / largest  # so that squares neither overflow nor vanish
+    return Plane(point, normal / np.linalg.norm(normal))
 
 
 def schema() -> dict[str, Any]:

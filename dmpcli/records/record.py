@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Column, Schema
-from dmpcli.records.streams import Source
+from dmpcli.records.streams import PART, TABLE, Source
 
 _KEY = b"dmpcli"
 _TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
@@ -236,9 +237,52 @@ def header_of(table: Any, name: str) -> dict[str, Any]:
         header = json.loads(metadata[_KEY])
     except ValueError:
         header = None
-    if not isinstance(header, dict) or not isinstance(header.get("version", 0), int):
+    if not isinstance(header, dict) or not _sound(header):
         raise InputError(f"{name}: its dmpcli metadata are damaged; make the file again")
     return header
+
+
+def _sound(header: dict[str, Any]) -> bool:
+    """Tell whether metadata hold what their readers rely on."""
+    facts, inputs = header.get("facts", {}), header.get("inputs", [])
+    return (
+        type(header.get("version")) is int
+        and isinstance(header.get("options", {}), dict)
+        and isinstance(inputs, list)
+        and all(isinstance(entry, dict) for entry in inputs)
+        and isinstance(facts, dict)
+        and _sound_facts(facts)
+        and isinstance(facts.get("trajectory", {}), dict)
+        and _sound_facts(facts.get("trajectory", {}))
+    )
+
+
+def _sound_facts(facts: dict[str, Any]) -> bool:
+    sizes = dict.fromkeys(("normal", "start", "goal"), 3) | dict.fromkeys(("k", "d", "alpha_e"), 6)
+    return all(
+        isinstance(facts[key], list)
+        and len(facts[key]) == size
+        and all(_is_number(value) for value in facts[key])
+        for key, size in sizes.items()
+        if key in facts
+    ) and all(_is_number(facts[key]) for key in ("tau", "duration", "rate") if key in facts)
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and bool(np.isfinite(value))  # type: ignore[call-overload]
+
+
+def foreign_parts(folder: Path) -> list[str]:
+    """Names of files in a dataset folder that stand where ours would, but are not ours."""
+    foreign = []
+    for file in sorted([*folder.glob(PART), *folder.glob(TABLE)]):
+        try:
+            ours = _KEY in (pq.read_schema(file).metadata or {})
+        except (pa.ArrowException, OSError, ValueError):
+            ours = False
+        if not ours:
+            foreign.append(file.name)
+    return foreign
 
 
 def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:

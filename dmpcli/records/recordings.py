@@ -14,6 +14,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.primitives.smoothing import Stroke
 from dmpcli.records import record, schemas, tables
+from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.schemas import EULER_ANGLES, POSE
 from dmpcli.records.streams import Source
 from dmpcli.records.tables import Table
@@ -22,6 +23,18 @@ RotationForm = Literal["euler", "rotvec", "quaternion"]
 
 SHORTEST = 10
 """Fewer samples than this are no stroke."""
+
+LONGEST = 1e6
+"""A recording longer than this, s, is in another unit of time."""
+
+SHORTEST_STEP = 1e-6
+"""Rows nearer to each other than this, s, are in another unit of time."""
+
+LARGEST_TURN = 4 * np.pi
+"""Angles beyond this, rad, are in degrees."""
+
+LONGEST_GAP = 25.0
+"""A gap of more median steps than this cannot be filled in: nobody knows what the tool did."""
 
 LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -123,7 +136,7 @@ def stroke(source: Source, layout: Layout | None = None) -> Stroke:
     ------
     InputError
         A column is missing, holds text, NaN or infinity, time repeats or runs backward, or there
-        are fewer than `SHORTEST` samples; names column and row.
+        are fewer than `SHORTEST` samples or a long gap; names column and row.
     """
     if layout is None and record.is_ours(source):
         ours = record.decode(source, schemas.DEMONSTRATION)
@@ -131,9 +144,14 @@ def stroke(source: Source, layout: Layout | None = None) -> Stroke:
         t, position, rotation = ours.t, ours.position(), ours.rotation()
         table = Table(source.name, ours.columns)
     else:
+        if source.content.lstrip()[:1] == b"{":
+            raise InputError(
+                f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet"
+            )
         table = tables.read(source)
         t, position, rotation = _mapped(table, layout or Layout())
     _check_time(table, t, layout or Layout())
+    _check_position(table, position)
     return Stroke(t, position, rotation)
 
 
@@ -172,6 +190,12 @@ def _mapped(table: Table, layout: Layout) -> tuple[Floats, Floats, Floats | None
             )
         return t, position, rotations.from_quaternion(values)
     values *= ANGLE[layout.angle]
+    if np.abs(values).max() > LARGEST_TURN:
+        row = int(np.argmax(np.abs(values).max(axis=1)))
+        raise InputError(
+            f"{table.name}: {table.at(row)}: an angle of {np.abs(values).max():g} rad; "
+            "check the unit of angle (--angle-unit deg)"
+        )
     return (
         t,
         position,
@@ -189,4 +213,32 @@ def _check_time(table: Table, t: Floats, layout: Layout) -> None:
         raise InputError(
             f"{table.name}: column {layout.column('t')!r}, {table.at(row)}: time {verb} "
             f"({t[row - 1]:.6g} s, then {t[row]:.6g} s); sort the rows or remove the repeated ones"
+        )
+    step = float(np.median(steps))
+    if t[-1] - t[0] > LONGEST:
+        raise InputError(
+            f"{table.name}: column {layout.column('t')!r}: spans {t[-1] - t[0]:.3g} s; "
+            "check the unit of time (--time-unit)"
+        )
+    if step < SHORTEST_STEP:
+        raise InputError(
+            f"{table.name}: column {layout.column('t')!r}: rows are {step:.3g} s apart; "
+            "check the unit of time (--time-unit)"
+        )
+    if np.any(steps > LONGEST_GAP * step):
+        row = int(np.argmax(steps)) + 1
+        raise InputError(
+            f"{table.name}: column {layout.column('t')!r}, {table.at(row)}: nothing was recorded "
+            f"for {steps[row - 1]:.6g} s, {steps[row - 1] / step:.0f} samples; cut the file there, "
+            "or record again"
+        )
+
+
+def _check_position(table: Table, position: Floats) -> None:
+    beyond = np.abs(position).max(axis=1) > FARTHEST
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        raise InputError(
+            f"{table.name}: {table.at(row)}: the position is beyond {FARTHEST:g} mm; check the "
+            "unit of length (--length-unit)"
         )

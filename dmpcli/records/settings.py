@@ -124,13 +124,20 @@ def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, A
 def _first(error: ValidationError, section: str, origin: Mapping[str, str]) -> str:
     """One line for the first thing wrong, naming where it was said."""
     detail = error.errors()[0]
-    keys = [str(part) for part in detail["loc"]]
-    where = origin.get(keys[0], "defaults") if keys else "defaults"
-    name = ".".join(keys) or section
+    message = detail["msg"].removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    if not detail["loc"]:  # settings that fit their ranges but not each other
+        return f"[{section}] {message}"
+    first, *rest = detail["loc"]
+    where = origin.get(str(first), "defaults")
+    name = str(first) + "".join(f"[{part}]" for part in rest if where != "command line")
+    if detail["type"] == "missing":
+        if rest:
+            return f"{where}: [{section}] {first}: has too few entries, [{rest[0]}] is missing"
+        return f"[{section}] {first}: is not set; give a preset that sets it"
     shown = f"--{name.replace('_', '-')}" if where == "command line" else f"[{section}] {name}"
-    given = "" if detail["type"] in ("missing", "extra_forbidden") else f" = {detail['input']!r}"
+    given = "" if detail["type"] == "extra_forbidden" else f" = {detail['input']!r}"
     prefix = "" if where == "command line" else f"{where}: "
     if detail["type"] == "extra_forbidden":
         return f"{prefix}{shown}: no such setting"
-    message = detail["msg"].removeprefix("Value error, ")
-    return f"{prefix}{shown}{given}: {message[0].lower()}{message[1:]}"
+    return f"{prefix}{shown}{given}: {message}"

@@ -68,7 +68,7 @@ class SkillFile(_Part):
     """A dynamic movement primitive of six coordinates, learned by dmpcli fit."""
 
     schema_name: Annotated[Literal["skill"], Field(alias="schema")] = SCHEMA
-    version: Annotated[int, Field(ge=1)] = VERSION
+    version: Annotated[int, Field(ge=1, strict=True)]
     tool: str
     frame_convention: str = FRAME
     euler_convention: str = EULER
@@ -108,6 +108,12 @@ class SkillFile(_Part):
             raise ValueError("task_frame.axes is not a right-handed rotation")
         if 0.0 in self.forcing_factor:
             raise ValueError("forcing_factor must not hold 0")
+        if (self.model == "original") != (self.forcing_scale is not None):
+            raise ValueError("forcing_scale belongs to the original model, and to it alone")
+        frame = self.task_frame
+        gap = np.linalg.norm(np.array(frame.goal) - np.array(frame.start))
+        if abs(gap - frame.length) > 1e-6 * (1.0 + frame.length):
+            raise ValueError("task_frame.length is not the distance from start to goal")
         return self
 
 
@@ -117,6 +123,7 @@ def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenanc
     rotation = None if frame.rotation is None else rotations.to_euler(frame.rotation).tolist()
     document = SkillFile(
         schema_name=SCHEMA,
+        version=VERSION,
         tool=provenance.tool,
         model=skill.model,
         forcing_scale=skill.forcing_scale,

@@ -7,7 +7,9 @@ import contextlib
 import hashlib
 import io
 import os
+import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,7 +44,9 @@ def read(path: str | Path) -> Source:
         The file is missing, a directory, empty or not readable.
     """
     if str(path) == DASH:
-        source = Source("standard input", sys.stdin.buffer.read())
+        if sys.stdin is None:
+            raise InputError("standard input: is closed; name a file")
+        source = Source(shown(path), sys.stdin.buffer.read())
     else:
         file = Path(path)
         if file.is_dir():
@@ -58,6 +62,32 @@ def read(path: str | Path) -> Source:
     return source
 
 
+def shown(path: str | Path, output: bool = False) -> str:
+    """Return what messages call a file name; ``-`` is standard input or output."""
+    if str(path) != DASH:
+        return str(path)
+    return "standard output" if output else "standard input"
+
+
+def say(content: bytes) -> None:
+    """Write data to standard output.
+
+    Raises
+    ------
+    InputError
+        It is closed, or there is no space. A reader that has gone is a BrokenPipeError.
+    """
+    if sys.stdout is None:
+        raise InputError("standard output: is closed")
+    try:
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise InputError(f"standard output: cannot be written: {error.strerror}") from None
+
+
 def check_writable(path: str | Path) -> None:
     """Refuse an output that could not be written, before any work is done.
 
@@ -67,6 +97,8 @@ def check_writable(path: str | Path) -> None:
         The folder is missing or not writable, or the name is a directory's.
     """
     if str(path) == DASH:
+        if sys.stdout is None:
+            raise InputError("standard output: is closed; name a file")
         if sys.stdout.isatty():
             raise InputError("-o -: would write a file to the terminal; redirect or name a file")
         return
@@ -89,11 +121,15 @@ def write(path: str | Path, content: bytes) -> None:
         The output cannot be written (no space, no right).
     """
     if str(path) == DASH:
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
+        say(content)
         return
     check_writable(path)
     file = Path(path)
+    if file.is_symlink():
+        file = file.resolve()
+    if file.exists() and not file.is_file():
+        _write_special(file, content)
+        return
     # A leading dot: dataset readers and Make patterns pass over it.
     temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
@@ -109,7 +145,16 @@ def write(path: str | Path, content: bytes) -> None:
             temporary.unlink()
 
 
+def _write_special(file: Path, content: bytes) -> None:
+    """Write to a named pipe or a device, which must not be replaced by a file."""
+    try:
+        file.write_bytes(content)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
 PART = "part-*.parquet"
+TABLE = "pairs.parquet"
 
 
 def check_folder(path: str | Path) -> None:
@@ -118,12 +163,12 @@ def check_folder(path: str | Path) -> None:
     Raises
     ------
     InputError
-        The name is a file's or ``-``, its parent is missing, or it holds files that are not ours.
+        The name is a file's or ``-``, or its parent is missing or not writable.
     """
     folder = Path(path)
     if str(path) == DASH:
         raise InputError("-o -: many trajectories need a folder, not standard output")
-    if folder.is_file():
+    if folder.exists() and not folder.is_dir():
         raise InputError(f"{path}: is a file; many trajectories need a folder")
     place = folder if folder.is_dir() else folder.absolute().parent
     if not place.is_dir():
@@ -132,16 +177,27 @@ def check_folder(path: str | Path) -> None:
         raise InputError(f"{path}: the folder {place} is not writable")
 
 
-def begin_folder(path: str | Path) -> None:
-    """Make a dataset folder, and remove the parts and the table of an older one.
+@contextlib.contextmanager
+def dataset(path: str | Path) -> Iterator[Path]:
+    """Yield a folder to write parts and their table into; they take their place when all is done.
 
-    The table of pairs goes first: a folder without it is one that is not finished.
+    Until then an older dataset stays whole; after an error or an interrupt nothing is left behind.
+    Then the older table goes first and the new one comes last, so that a folder with a table is a
+    finished one. Files of other names are left alone.
     """
     folder = Path(path)
+    temporary = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.tmp")
     try:
+        temporary.mkdir()
+        yield temporary
         folder.mkdir(exist_ok=True)
-        (folder / "pairs.parquet").unlink(missing_ok=True)
+        (folder / TABLE).unlink(missing_ok=True)
         for part in sorted(folder.glob(PART)):
             part.unlink()
+        for part in sorted(temporary.glob(PART)):
+            part.replace(folder / part.name)
+        (temporary / TABLE).replace(folder / TABLE)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

@@ -140,7 +140,12 @@ def _csv(source: Source) -> Table:
             skipinitialspace=True,
         )
     except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
-        raise InputError(f"{source.name}: cannot be read as a table: {error}") from None
+        reason = str(error).strip().splitlines()[0]
+        raise InputError(f"{source.name}: cannot be read as a table: {reason}") from None
+    names = [name.strip().strip('"') for name in _cells(lines[0][1], separator)]
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
     columns = {str(name).strip(): frame[name].to_numpy(dtype=object) for name in frame.columns}
     return Table(source.name, columns, [number for number, _ in lines[1:]])
 
@@ -150,13 +155,15 @@ def _counts(line: str) -> bool:
 
 
 def _check_lengths(name: str, lines: Sequence[tuple[int, str]], separator: str) -> None:
-    def cells(line: str) -> int:
-        return len(line.split()) if separator == r"\s+" else line.count(separator) + 1
-
-    header = cells(lines[0][1])
+    header = len(_cells(lines[0][1], separator))
     for number, line in lines:
-        if cells(line) != header and '"' not in line:
+        count = len(_cells(line, separator))
+        if count != header and '"' not in line:
             raise InputError(
-                f"{name}: line {number} has {cells(line)} columns, the header has {header}; "
+                f"{name}: line {number} has {count} columns, the header has {header}; "
                 "mend or remove the line"
             )
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return line.split() if separator == r"\s+" else line.split(separator)

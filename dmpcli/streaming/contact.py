@@ -1,4 +1,4 @@
-"""What the loop feels: the sensor's newest wrench, and the force coupling that presses with it."""
+"""What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,106 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InstrumentError
-from dmpcli.instruments.protocols import Clock, RobotState, Sensor
+from dmpcli.instruments.protocols import RobotState
+from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives import coupling
 from dmpcli.primitives.coupling import Displacement, Filter, Law
 from dmpcli.streaming.plan import Plan
 
-# Without a fresh sample for so long the sensor counts as dead, s.
-SILENCE = 0.1
-# A zero is taken over this time, s.
-ZERO_TIME = 0.5
 # The force has settled when it stays this near to the set-point for this long.
 SETTLED_SHARE, SETTLED_TIME = 0.1, 0.1
-
-
-def at_rest(sensor: Sensor, clock: Clock, long: bool) -> Floats:
-    """Wait at rest for the sensor's first samples.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        Started.
-    clock : Clock
-    long : bool
-        Wait long enough for a zero to be taken from them.
-
-    Returns
-    -------
-    array, shape (n, 6)
-        As sensed, N and N·m.
-
-    Raises
-    ------
-    InstrumentError
-        Nothing came.
-    """
-    pause = ZERO_TIME if long else SILENCE
-    clock.sleep_until(clock.now() + pause)
-    samples = sensor.poll()
-    if not samples:
-        raise InstrumentError(
-            f"force sensor: sends nothing within {pause:g} s; check cable and power"
-        )
-    return np.array([sample.wrench for sample in samples])
-
-
-class Sensing:
-    """The newest compensated wrench of a sensor.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        Started.
-    compensate : callable
-        From the wrench as sensed, shape (6,), and the tool's rotation to the wrench on the tool,
-        at the TCP, in base axes.
-    first : array, shape (6,)
-        A reading from before the loop, as sensed.
-    """
-
-    def __init__(
-        self, sensor: Sensor, compensate: Callable[[Floats, Floats], Floats], first: Floats
-    ) -> None:
-        self._sensor = sensor
-        self._compensate = compensate
-        self._sensed = first
-        self._heard: float | None = None
-
-    def read(self, state: RobotState) -> Floats:
-        """Return the mean wrench since the last call, or the one before.
-
-        Parameters
-        ----------
-        state : RobotState
-            For the time and the tool's rotation.
-
-        Returns
-        -------
-        array, shape (6,)
-            N and N·m.
-
-        Raises
-        ------
-        InstrumentError
-            The sensor is silent, or flags itself or a saturated reading.
-        """
-        samples = self._sensor.poll()
-        for sample in samples:
-            if not sample.healthy:
-                raise InstrumentError(
-                    f"force sensor: sample {sample.seq} is saturated or flagged as faulty; "
-                    "check its range and cable"
-                )
-        if samples:
-            self._sensed = np.mean([sample.wrench for sample in samples], axis=0)
-            self._heard = samples[-1].t
-        self._heard = state.t if self._heard is None else self._heard
-        silent = state.t - self._heard
-        if silent > SILENCE:
-            raise InstrumentError(f"force sensor: silent for {silent:.2f} s; check cable and power")
-        return self._compensate(self._sensed, state.rotation)
 
 
 class Pressing:
@@ -177,13 +85,68 @@ class Pressing:
         retreat = bool(self._retreats[min(int(index), len(self._plan) - 1)])
         self._state = coupling.displace(self._law, self._state, force, retreat)
         self._delta = coupling.follow(self._filter, self._delta, self._state.e)
-        moved: Floats = self._delta[0] * normal
-        return moved
+        return self.hold(index)
+
+    def hold(self, index: float) -> Floats:
+        """Return the last displacement again, along the normal of a set-point; it does not grow.
+
+        For a cycle that feels no force and for one that comes to rest: taken as contact lost, no
+        force would make the tool seek the surface.
+
+        Parameters
+        ----------
+        index : float
+            Number of the set-point.
+
+        Returns
+        -------
+        array, shape (3,)
+            mm.
+        """
+        held: Floats = self._delta[0] * self._plan.normal_at(index)
+        return held
 
 
 @dataclass(frozen=True)
 class Touch:
-    """What the loop feels with: a sensor, and the coupling if it was asked for."""
+    """What the loop feels with.
+
+    Attributes
+    ----------
+    sensing : Sensing
+    compensate : callable
+        From the wrench as sensed, shape (6,), and the tool's rotation to the wrench on the tool,
+        at the TCP, in base axes.
+    pressing : Pressing or None
+        The coupling if it was asked for.
+    """
 
     sensing: Sensing
+    compensate: Callable[[Floats, Floats], Floats]
     pressing: Pressing | None = None
+
+    def feel(self, state: RobotState, now: float) -> Floats | None:
+        """Return the mean wrench since the last cycle, or the newest one while it is fresh.
+
+        Parameters
+        ----------
+        state : RobotState
+            For the tool's rotation.
+        now : float
+            s, on the loop's clock.
+
+        Returns
+        -------
+        array, shape (6,), or None
+            N and N·m; None where no sample is fresh enough to be believed.
+
+        Raises
+        ------
+        InstrumentError
+            The sensor is silent, or a sample must not be believed.
+        """
+        samples = self.sensing.hear(now) or [self.sensing.newest]
+        if not self.sensing.fresh(now):
+            return None
+        sensed = np.mean([sample.wrench for sample in samples], axis=0)
+        return self.compensate(sensed, state.rotation)

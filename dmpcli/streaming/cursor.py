@@ -42,6 +42,11 @@ class Cursor:
         self._acceleration: Floats = np.linalg.norm(acceleration, axis=-1)
 
     @property
+    def braking(self) -> bool:
+        """Coming to rest because it was asked to."""
+        return self._brake is not None
+
+    @property
     def waiting(self) -> bool:
         """Holding at the stroke's start."""
         return self._waits and self._brake is None and self.index == self.plan.lead
@@ -64,19 +69,17 @@ class Cursor:
         """Go on from the stroke's start."""
         self._waits = False
 
-    def advance(self, cycles: int) -> None:
-        """Go on by this many servo cycles."""
+    def advance(self) -> None:
+        """Go on by one set-point, however late the loop is: each step is one that was checked."""
         if self._brake is not None:
             begun, duration = self._brake
-            self._elapsed += cycles * self.plan.period
+            self._elapsed += self.plan.period
             spent = deceleration.progress(self._elapsed, duration) if duration else 0.0
             self.index = min(begun + spent / self.plan.period, self._end)
         elif self.index >= self._end and not self.waiting:
-            self._elapsed += cycles * self.plan.period
-        elif self._waits:
-            self.index = min(self.index + cycles, float(self.plan.lead))
-        else:
-            self.index = min(self.index + cycles, self._end)
+            self._elapsed += self.plan.period
+        elif not self.waiting:
+            self.index = min(self.index + 1.0, self._end)
 
     def brake(self) -> None:
         """Decelerate to rest along the path, from now on; the first call counts."""

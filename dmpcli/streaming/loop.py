@@ -1,7 +1,9 @@
 """The servo loop of `execute`: one set-point per period, at absolute deadlines.
 
-Deadline k is ``begin + k·period``. A late cycle never makes up by a burst: what it missed is
-skipped, so that a set-point's number stays its time. Every cycle is logged, the last one too.
+Deadline k is ``begin + k·period``. A late cycle never makes up by a burst, and it never jumps: the
+deadlines that it missed are gone, and the plan goes on from where it is, that much later, so that
+every step between two set-points is one that the pre-flight checks have seen. Every cycle is
+logged, the last one too.
 """
 
 import signal
@@ -12,10 +14,12 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
+from dmpcli.instruments import guards
+from dmpcli.instruments.guards import Trail
+from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
 from dmpcli.streaming.contact import Touch
 from dmpcli.streaming.cursor import Cursor
-from dmpcli.streaming.interruption import Interruption
 from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.plan import Plan, gap
 from dmpcli.streaming.run_file import Log, Row
@@ -23,8 +27,8 @@ from dmpcli.streaming.run_file import Log, Row
 DONE = "done"
 # At rest is what moves less than so many mm and rad in this time, s; it is waited for so long, s.
 _REST_WINDOW, _REST_DISTANCE, _REST_ANGLE, _REST_PATIENCE = 0.05, 0.02, 0.001, 2.0
-# The actual pose may lag the set-points by this much more than the look-ahead, s.
-_LAG = 0.1
+# Between two checked set-points the brake's curve may be faster than either by this share.
+_SLACK = 0.01
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Outcome:
     signal : int or None
         The signal that stopped it.
     missed : int
-        Set-points that were skipped because the loop was late.
+        Deadlines at which nothing was sent because the loop was late.
     """
 
     reason: str
@@ -77,23 +81,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Cycle:
-    """One period: its number, when it was due, how late the loop woke, and what it skipped."""
+    """One period: its deadline, how late the loop woke, and the number of the next one."""
 
-    number: int
     due: float
     late: float
-    skipped: int
+    following: int
 
 
-class _Halt(Exception):  # noqa: N818
-    def __init__(self, reason: str, error: type[DmpError] | None) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.error = error
-
-
-def _not_ready(mode: str) -> _Halt:
-    return _Halt(f"robot: {mode}; clear it on the pendant", RefusedError)
+class _StoppedAtOnce(Exception):  # noqa: N818
+    """The second signal."""
 
 
 class Loop:
@@ -104,7 +100,7 @@ class Loop:
     plan : Plan
         Checked.
     limits : Limits
-        For the deceleration.
+        For the deceleration, and for every set-point that is sent.
     watch : Watch
     arm : Arm
         Not yet in servo mode.
@@ -130,21 +126,19 @@ class Loop:
         self.log = Log()
         self._watch = watch
         self._arm = arm
-        self._sensing = touch.sensing if touch else None
+        self._touch = touch
         self._pressing = touch.pressing if touch else None
+        self._limits = limits
         self._cursor = Cursor(plan, limits, wait=self._pressing is not None)
-        # At least a period: an arm that takes set-points at once has no look-ahead.
-        self._late_limit = max(arm.info.lookahead / 2.0, plan.period)
         self._missed = 0
-        window = int(np.ceil((arm.info.lookahead + _LAG) / plan.period)) + 1
-        self._sent: deque[tuple[Floats, Floats]] = deque(maxlen=window)
+        self._trail = Trail(arm.info, plan.period, watch.following_error, watch.following_angle)
         self._states: deque[RobotState] = deque()
         self._finished: float | None = None
 
     @property
     def senses(self) -> bool:
         """Whether there is a force sensor."""
-        return self._sensing is not None
+        return self._touch is not None
 
     @property
     def presses(self) -> bool:
@@ -165,54 +159,60 @@ class Loop:
             Anything that an instrument or a limit can cause; only defects are raised.
         """
         reason: str = DONE
-        error: type[DmpError] | None = None
+        failure: DmpError | None = None
+        stopping: InstrumentError | None = None
         try:
-            try:
-                self._arm.servo.start(self.plan.period)
-                self._stream(interruption)
-            finally:
-                # Also on a defect of ours: nothing may leave the arm moving.
-                self._arm.servo.stop()
-        except _Halt as halt:
-            reason, error = halt.reason, halt.error
-        except InstrumentError as failure:
-            reason, error = str(failure), InstrumentError
+            self._arm.servo.start(self.plan.period)
+            self._stream(interruption)
+        except _StoppedAtOnce:
+            reason = "stopped at once at the second signal"
+        except (InstrumentError, RefusedError) as error:
+            failure = error
+        finally:
+            # Also on a defect of ours: nothing may leave the arm moving.
+            stopping = guards.leave(self._arm.servo.stop)
+        failure = failure or stopping
         number = interruption.number
-        if error is None and number is not None:
+        if failure is not None:
+            return Outcome(str(failure), type(failure), None, self._missed)
+        if number is not None:
             name = signal.Signals(number).name
-            how = "decelerated along the path" if reason == DONE else reason
-            reason = f"{name}: {how}"
-        else:
-            number = None
-        return Outcome(reason, error, number, self._missed)
+            reason = f"{name}: {'decelerated along the path' if reason == DONE else reason}"
+        return Outcome(reason, None, number, self._missed)
 
     def _stream(self, interruption: Interruption) -> None:
         begin = self._arm.clock.now()
-        last, number = 0, 0
+        number = 0
         while True:
             cycle = self._wait(begin, number)
+            number = cycle.following
             state = self._arm.servo.state()
-            wrench = self._sensing.read(state) if self._sensing else None
-            self._cursor.advance(cycle.number - last)
-            last = cycle.number
-            halt = self._fault(cycle, state, wrench, interruption.count)
-            if halt is not None:
-                self._record(cycle, state, wrench, self._sent[-1] if self._sent else None)
-                raise halt
-            if interruption.count:
-                self._cursor.brake()
-            elif self._pressing is not None and self._cursor.waiting and self._pressing.settled:
-                self._cursor.release()
-            setpoint = self._setpoint(wrench)
+            if self._trail.last is not None:
+                self._cursor.advance()
+            wrench: Floats | None = None
+            try:
+                if interruption.count > 1:
+                    raise _StoppedAtOnce
+                self._check(cycle, state)
+                wrench = self._feel(state)
+                if interruption.count:
+                    self._cursor.brake()
+                elif self._pressing and self._cursor.waiting and self._pressing.settled:
+                    self._cursor.release()
+                setpoint = self._setpoint(wrench)
+                self._check_setpoint(*setpoint)
+            except (_StoppedAtOnce, DmpError):
+                self._record(cycle, state, wrench, self._trail.last)
+                raise
             taken = self._arm.servo.send(*setpoint)
             late = max(self._arm.clock.now() - begin - cycle.due, 0.0)
             self._record(cycle, state, wrench, setpoint, late)
             if not taken:
-                raise self._refused()
-            self._sent.append(setpoint)
+                guards.check_state(self._arm.servo.state())
+                raise InstrumentError("robot: refused a set-point; see its pendant")
+            self._trail.add(*setpoint)
             if self._at_rest(state):
                 return
-            number = cycle.number + 1
 
     def _wait(self, begin: float, number: int) -> _Cycle:
         period, clock = self.plan.period, self._arm.clock
@@ -220,61 +220,49 @@ class Loop:
         late = max(clock.now() - begin - number * period, 0.0)  # rounding may say earlier
         skipped = int(late / period) if late > period else 0
         self._missed += skipped
-        number += skipped
-        return _Cycle(number, number * period, late - skipped * period, skipped)
+        return _Cycle(number * period, late, number + skipped + 1)
 
-    def _fault(
-        self, cycle: _Cycle, state: RobotState, wrench: Floats | None, signals: int
-    ) -> _Halt | None:
-        """Why the arm must stop at once, if it must."""
-        late = cycle.late + cycle.skipped * self.plan.period
-        distance, angle = self._strayed(state)
-        force = 0.0 if wrench is None else float(np.linalg.norm(wrench[:3]))
-        pressing = self._pressing if self._cursor.waiting else None
-        if signals > 1:
-            return _Halt("stopped at once at the second signal", None)
-        if state.mode != "ready":
-            return _not_ready(state.mode)
-        if late > self._late_limit:
-            return _Halt(
-                f"{1e3 * late:.0f} ms late, over {1e3 * self._late_limit:.0f} ms (half the "
-                "robot's look-ahead); use a quieter computer or a longer look-ahead",
-                RefusedError,
-            )
-        if distance > self._watch.following_error or angle > self._watch.following_angle:
-            return _Halt(
-                f"following error {distance:.2f} mm, {angle:.3f} rad is over "
-                f"{self._watch.following_error:g} mm, {self._watch.following_angle:g} rad",
-                RefusedError,
-            )
-        if force > self._watch.force:
-            return _Halt(f"force {force:.1f} N is over {self._watch.force:g} N", RefusedError)
-        if pressing is not None and pressing.given_up:
-            return _Halt(f"{pressing.given_up}; check surface and sensor", RefusedError)
-        return None
+    def _check(self, cycle: _Cycle, state: RobotState) -> None:
+        """Stop at once where the arm must not go on."""
+        guards.check_state(state, self._limits.workspace)
+        guards.check_late(cycle.late, self._arm.info, self.plan.period)
+        self._trail.check(state)
+        if self._pressing is not None and self._cursor.waiting and self._pressing.given_up:
+            raise RefusedError(f"{self._pressing.given_up}; check surface and sensor")
 
-    def _refused(self) -> _Halt:
-        mode = self._arm.servo.state().mode
-        if mode != "ready":
-            return _not_ready(mode)
-        return _Halt("robot: refused a set-point; see its pendant", InstrumentError)
-
-    def _strayed(self, state: RobotState) -> tuple[float, float]:
-        """Distance and angle to the nearest of the set-points just sent."""
-        if not self._sent:
-            return 0.0, 0.0
-        positions = np.array([p for p, _ in self._sent])
-        traces = np.einsum("nij,ij->n", np.array([R for _, R in self._sent]), state.rotation)
-        cosine = np.clip((traces.max() - 1.0) / 2.0, -1.0, 1.0)
-        distance = np.linalg.norm(positions - state.position, axis=1).min()
-        return float(distance), float(np.arccos(cosine))
+    def _feel(self, state: RobotState) -> Floats | None:
+        if self._touch is None:
+            return None
+        wrench = self._touch.feel(state, self._arm.clock.now())
+        if wrench is not None:
+            force = float(np.linalg.norm(wrench[:3]))
+            if not force <= self._watch.force:
+                raise RefusedError(f"force {force:.1f} N is over {self._watch.force:g} N")
+        return wrench
 
     def _setpoint(self, wrench: Floats | None) -> tuple[Floats, Floats]:
         index = self._cursor.index
         position, rotation = self.plan.at(index)
-        if self._pressing is not None and wrench is not None and index >= self.plan.lead:
-            position = position + self._pressing.displace(index, wrench)
+        if self._pressing is not None and index >= self.plan.lead:
+            if wrench is None or self._cursor.braking:
+                position = position + self._pressing.hold(index)
+            else:
+                position = position + self._pressing.displace(index, wrench)
         return position, rotation
+
+    def _check_setpoint(self, position: Floats, rotation: Floats) -> None:
+        """Stop rather than send what the checks before the motion cannot have seen."""
+        guards.check_setpoint(position, rotation, self._limits.workspace)
+        if self._trail.last is None:
+            return
+        distance, angle = gap(self._trail.last, (position, rotation))
+        speed, turning = distance / self.plan.period, angle / self.plan.period
+        most, most_turning = self._limits.speed, self._limits.rotation_speed
+        if not (speed <= (1.0 + _SLACK) * most and turning <= (1.0 + _SLACK) * most_turning):
+            raise RefusedError(
+                f"the next set-point would take {speed:.4g} mm/s, {turning:.3g} rad/s, over "
+                f"{most:g} mm/s, {most_turning:g} rad/s"
+            )
 
     def _at_rest(self, state: RobotState) -> bool:
         """Whether the plan has ended and the arm stands still."""
@@ -286,7 +274,7 @@ class Loop:
         self._finished = state.t if self._finished is None else self._finished
         waited = state.t - self._finished - self._arm.info.lookahead
         if waited > _REST_PATIENCE:
-            raise _Halt("the arm does not come to rest after its last set-point", InstrumentError)
+            raise InstrumentError("the arm does not come to rest after its last set-point")
         here = (state.position, state.rotation)
         gaps = np.array([gap((s.position, s.rotation), here) for s in self._states])
         still = bool(np.all(gaps.max(axis=0) <= (_REST_DISTANCE, _REST_ANGLE)))

@@ -20,7 +20,7 @@ class Row:
     t : float
         When the actual pose was read, s since the first deadline.
     t_plan : float
-        Time along the trajectory file, s.
+        Time along the trajectory file, s; after a missed deadline it lags further behind `t`.
     planned, sent, actual : tuple of array, shape (3,) and (3, 3)
         mm; a cycle that stopped before it sent repeats the last set-point.
     deadline, lateness : float

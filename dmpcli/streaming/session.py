@@ -6,20 +6,25 @@ from typing import Any
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.instruments.mock import Plate, Scene
-from dmpcli.instruments.protocols import RobotState, Sensor
+from dmpcli.instruments.protocols import Clock, RobotState, Sensor
+from dmpcli.instruments.sensing import Sensing
 from dmpcli.measures.timing import punctuality
+from dmpcli.primitives.compensation import Compensation
 from dmpcli.primitives.coupling import Filter, fast_filter
+from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.streaming import plan as planning
 from dmpcli.streaming import preflight, run_file
-from dmpcli.streaming.contact import Pressing, Sensing, Touch
+from dmpcli.streaming.contact import Pressing, Touch
 from dmpcli.streaming.loop import DONE, Arm, Loop, Outcome, Watch
 from dmpcli.streaming.plan import Plan, Stroke
 from dmpcli.streaming.preflight import Check
 from dmpcli.streaming.settings import ExecuteSettings
 
 SENSOR_RATE = 100.0
+# A zero is taken over this time, s.
+ZERO_TIME = 0.5
 
 
 def scene(stroke: Stroke, presses: bool) -> Scene:
@@ -99,26 +104,39 @@ def check_period(arm: Arm, period: float) -> None:
         )
 
 
-def start(sensor: Sensor) -> None:
-    """Open the sensor and let it stream."""
-    info = sensor.open()
-    sensor.start(min(SENSOR_RATE, info.rate))
-
-
 def touch(
-    sensing: Sensing, plan: Plan, settings: ExecuteSettings, coupling: Filter | None
+    sensor: Sensor,
+    tool: Tool,
+    plan: Plan,
+    settings: ExecuteSettings,
+    clock: Clock,
+    coupling: Filter | None,
 ) -> Touch:
-    """Return what the loop feels with.
+    """Let the sensor stream at rest, and return what the loop feels with.
 
     Parameters
     ----------
-    sensing : Sensing
+    sensor : Sensor
+    tool : Tool
+        Where its zero is None, it is taken now.
     plan : Plan
     settings : ExecuteSettings
+    clock : Clock
     coupling : Filter, optional
         None: only log the wrench.
+
+    Raises
+    ------
+    InstrumentError
+        The sensor cannot be reached, is silent, or sends what must not be believed.
     """
-    return Touch(sensing, None if coupling is None else Pressing(settings.law(), coupling, plan))
+    info = sensor.open()
+    rate = min(SENSOR_RATE, info.rate)
+    sensor.start(rate)
+    sensing = Sensing(sensor, info, rate, plan.period, clock)
+    zeroed = sensing.zeroed(tool, plan.rotation[0], ZERO_TIME)
+    pressing = None if coupling is None else Pressing(settings.law(), coupling, plan)
+    return Touch(sensing, Compensation(zeroed), pressing)
 
 
 def coupling_filter(stroke: Stroke, facts: Mapping[str, Any], settings: ExecuteSettings) -> Filter:
@@ -172,6 +190,6 @@ def record_of(loop: Loop, outcome: Outcome, provenance: Provenance, realtime: bo
         "missed": outcome.missed,
     }
     if realtime:
-        found = punctuality(columns["lateness"], loop.plan.period)
+        found = punctuality(columns["deadline"], columns["lateness"], loop.plan.period)
         facts["lateness"] = {"p50": found.median, "p99": found.p99, "max": found.worst}
     return Record(schemas.RUN, columns, replace(provenance, facts=facts))

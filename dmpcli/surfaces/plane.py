@@ -14,6 +14,8 @@ from dmpcli.arrays import Floats
 STRAIGHT = 1e-3
 # A stroke is closed when start and goal are nearer than this part of its extent.
 CLOSED = 0.1
+# Cosine below which a direction lies in a plane and does not tell its sides apart: about a degree.
+UNDECIDED = 0.02
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,13 @@ class Plane:
     normal: Floats
 
     def facing(self, tool_axis: Floats | None) -> "Plane":
-        """Return the plane with its normal turned to the tool's side, see `side`."""
-        return Plane(self.point, self.normal * side(self.normal, tool_axis))
+        """Return the plane with its normal turned to the tool's side: n · R e_z < 0, or up.
+
+        A tool (or, without one, a base z axis) that lies nearly in the plane does not decide; the
+        normal then stays as it was given.
+        """
+        toward = self.normal[2] if tool_axis is None else -(self.normal @ tool_axis)
+        return Plane(self.point, -self.normal) if toward < -UNDECIDED else self
 
     def height(self, position: Floats) -> Floats:
         """Signed distance of points (..., 3) along the normal, mm, shape (...,)."""
@@ -211,6 +218,6 @@ def side(normal: Floats, tool_axis: Floats | None) -> float:
     otherwise follow from rounding.
     """
     toward = normal[2] if tool_axis is None else -(normal @ tool_axis)
-    if abs(toward) < 1e-6:
+    if abs(toward) < UNDECIDED:
         toward = normal[int(np.argmax(np.abs(normal)))]
     return 1.0 if toward > 0 else -1.0

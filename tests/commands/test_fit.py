@@ -111,7 +111,7 @@ def test_outputs_and_inputs_that_cannot_be_are_refused(recording, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["demo.csv"]
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     row=st.integers(0, 60),
     column=st.integers(0, 3),
@@ -128,7 +128,7 @@ def test_any_bad_cell_is_refused_with_its_line_and_column(tmp_path, row, column,
     assert not (tmp_path / "s.json").exists()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(order=st.permutations(range(12)))
 def test_time_that_repeats_or_runs_backward_is_refused(tmp_path, order):
     stroke = paper_stroke(12)
@@ -139,3 +139,31 @@ def test_time_that_repeats_or_runs_backward_is_refused(tmp_path, order):
     ordered = list(order) == sorted(order)
     assert done.exit_code == (0 if ordered else 2)
     assert ordered or "time runs backward" in done.stderr
+
+
+NUMBERS = ["--basis", "--damping", "--tau", "--alpha-1", "--cutoff"]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(option=st.sampled_from(NUMBERS), value=st.floats() | st.integers(-(10**9), 10**9))
+def test_any_number_fits_or_is_refused_in_a_line(recording, tmp_path, option, value):
+    if option == "--basis":
+        value = int(value) if abs(value) < 1e12 else 10**12
+    done = run(recording, "-o", tmp_path / "s.json", option, value)
+    assert done.exit_code in (0, 2)
+    if done.exit_code == 2:
+        assert f"{option} = " in done.stderr or "alpha_1 / tau" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--basis", 1], ["--basis", 1000], ["--damping", 0.01], ["--damping", 1000],
+        ["--cutoff", 0.01], ["--cutoff", 100000], ["--tau", 0.05], ["--tau", 100],
+        ["--alpha-1", 0.01], ["--alpha-1", 10], ["--alpha-1", 0.1, "--tau", 0.01],
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("regression", ["lwr", "ridge"])
+def test_the_ends_of_every_range_fit_to_finite_weights(recording, tmp_path, options, regression):
+    done = run(recording, "-o", tmp_path / "s.json", "--regression", regression, *options)
+    assert done.exit_code == 0, done.stderr

@@ -137,7 +137,7 @@ def test_what_cannot_be_recorded_is_refused_and_no_file_touched(tmp_path, option
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("mass = [0.005, 0.005, nan, 0.1, 0.1, 0.1]", "[record] mass.2 = nan"),
+        ("mass = [0.005, 0.005, nan, 0.1, 0.1, 0.1]", "[record] mass[2] = nan"),
         ("mass = [0.005, 0.005, 0.0, 0.1, 0.1, 0.1]", "z: mass = 0"),
         ("damping = [0.08, 0.08, -0.4, 3.0, 3.0, 3.0]", "z: damping = -0.4"),
         ("stiffness = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]", "rotation z: stiffness = -1"),

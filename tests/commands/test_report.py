@@ -204,7 +204,7 @@ def test_a_large_batch_is_reported_by_statistics(tmp_path, files):
     )
     text = dmpcli(files["demo"], folder).stdout
     assert "many: 24 strokes" in text
-    assert "24 ok, 1 too steep" in text
+    assert "24 drawn, 1 not; the first: too steep" in text
 
 
 def test_a_given_plane_decides_what_across_means(tmp_path, files):

@@ -124,6 +124,26 @@ def test_what_is_wrong_is_named_with_column_and_line(source, message):
     assert str(caught.value).startswith("log.csv")
 
 
+def test_a_long_pause_is_refused_where_it_is():
+    t = T.copy()
+    t[8:] += 3600.0
+    with pytest.raises(InputError, match=r"line 10: nothing was recorded for 3600\.05 s"):
+        stroke(csv(values=np.column_stack([t, XYZ])))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.column_stack([T * 1e-9, XYZ]), "rows are 5.26e-11 s apart; check the unit of time"),
+        (np.column_stack([T * 1e-320, XYZ]), "time repeats|check the unit of time"),
+        (np.column_stack([T, XYZ * 1e6]), r"line 2: the position is beyond 1e\+06 mm"),
+    ],
+)
+def test_numbers_beyond_all_sense_are_refused_with_a_hint_at_the_unit(values, message):
+    with pytest.raises(InputError, match=message):
+        stroke(csv(values=values))
+
+
 cells = st.text(alphabet="0123456789.,;-eExyzt \n#\"'nainf", max_size=120)
 
 

@@ -69,8 +69,51 @@ def test_a_dataset_folder_is_refused_where_a_file_lies(tmp_path):
         streams.check_folder(tmp_path / "no" / "batch")
 
 
-def test_a_dataset_folder_begins_without_the_parts_of_an_older_one(tmp_path):
-    for name in ("part-00000.parquet", "pairs.parquet", "notes.txt"):
-        (tmp_path / name).touch()
-    streams.begin_folder(tmp_path)
-    assert os.listdir(tmp_path) == ["notes.txt"]
+def write_dataset(path, content):
+    with streams.dataset(path) as folder:
+        (folder / "part-00000.parquet").write_bytes(content)
+        (folder / "pairs.parquet").write_bytes(content)
+
+
+def test_a_dataset_replaces_an_older_one_and_leaves_other_files_alone(tmp_path):
+    batch = tmp_path / "batch"
+    batch.mkdir()
+    for name in ("part-00000.parquet", "part-00001.parquet", "pairs.parquet", "notes.txt"):
+        (batch / name).write_bytes(b"old")
+    write_dataset(batch, b"new")
+    assert {p.name: p.read_bytes() for p in batch.iterdir()} == {
+        "part-00000.parquet": b"new",
+        "pairs.parquet": b"new",
+        "notes.txt": b"old",
+    }
+    assert os.listdir(tmp_path) == ["batch"]
+
+
+@pytest.mark.parametrize("error", [InputError, KeyboardInterrupt, SystemExit, ZeroDivisionError])
+def test_an_older_dataset_stays_whole_when_the_new_one_fails(tmp_path, error):
+    write_dataset(tmp_path / "batch", b"old")
+
+    def interrupted():
+        with streams.dataset(tmp_path / "batch") as folder:
+            (folder / "part-00000.parquet").write_bytes(b"half")
+            raise error
+
+    with pytest.raises(error):
+        interrupted()
+    assert os.listdir(tmp_path) == ["batch"]
+    assert (tmp_path / "batch" / "part-00000.parquet").read_bytes() == b"old"
+    assert (tmp_path / "batch" / "pairs.parquet").read_bytes() == b"old"
+
+
+def test_a_link_is_followed_and_a_named_pipe_is_written_to(tmp_path):
+    (tmp_path / "real").write_bytes(b"old")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    streams.write(tmp_path / "link", b"new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"new"
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    streams.write(tmp_path / "pipe", b"data")
+    assert os.read(reader, 10) == b"data"
+    os.close(reader)
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)

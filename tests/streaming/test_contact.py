@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 from streaming_fakes import START, plan, stroke
 
-from dmpcli.errors import InstrumentError
-from dmpcli.instruments.protocols import RobotState, Sample
+from dmpcli.instruments.clock import SimulatedClock
+from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
+from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law, fast_filter
 from dmpcli.rotations import from_euler
-from dmpcli.streaming.contact import Pressing, Sensing, at_rest
+from dmpcli.streaming.contact import Pressing, Touch
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)
@@ -21,76 +22,39 @@ class FakeSensor:
         return self.batches.pop(0) if self.batches else []
 
 
-class Clock:
-    def __init__(self):
-        self.t = 0.0
-
-    def now(self):
-        return self.t
-
-    def sleep_until(self, t):
-        self.t = t
+INFO = SensorInfo("fake", 100.0, np.full(6, 100.0))
 
 
-def sample(t, force, healthy=True):
-    return Sample(t, 1, np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]), healthy, 0)
+def sample(t, force):
+    return Sample(t, 1, np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]), True, 0)
 
 
-def state(t=0.0, angle=0.0):
-    return RobotState(t, START, from_euler(np.array([angle, 0.0, 0.0])), "ready")
+def state(angle=0.0):
+    return RobotState(0.0, START, from_euler(np.array([angle, 0.0, 0.0])), "ready")
 
 
 def turned(sensed, rotation):
     return np.concatenate([rotation @ sensed[:3], rotation @ sensed[3:]])
 
 
-def test_the_mean_since_the_last_cycle_is_read():
-    sensing = Sensing(FakeSensor([sample(0.0, 4.0), sample(0.01, 6.0)]), turned, np.zeros(6))
-    assert sensing.read(state(0.01))[2] == 5.0
+def touch(*batches):
+    sensor = FakeSensor(*batches)
+    return Touch(Sensing(sensor, INFO, 100.0, PERIOD, SimulatedClock()), turned)
 
 
-def test_without_fresh_samples_the_last_one_stays():
-    sensing = Sensing(FakeSensor([sample(0.0, 4.0)]), turned, np.full(6, 1.0))
-    sensing.read(state(0.0))
-    assert sensing.read(state(0.05))[2] == 4.0
+def test_the_mean_since_the_last_cycle_is_felt():
+    assert touch([sample(0.0, 4.0), sample(0.01, 6.0)]).feel(state(), 0.01)[2] == 5.0
 
 
-def test_before_the_first_sample_the_reading_at_rest_holds():
-    assert Sensing(FakeSensor(), turned, np.full(6, 3.0)).read(state(7.0))[2] == 3.0
+def test_without_a_new_sample_the_last_one_holds_while_it_is_fresh():
+    felt = touch([sample(0.0, 4.0)])
+    felt.feel(state(), 0.0)
+    assert felt.feel(state(), 0.04)[2] == 4.0
+    assert felt.feel(state(), 0.05) is None
 
 
 def test_the_wrench_is_compensated_for_the_pose_of_the_moment():
-    sensing = Sensing(FakeSensor([sample(0.0, 4.0)]), turned, np.zeros(6))
-    np.testing.assert_allclose(sensing.read(state(angle=np.pi))[2], -4.0)
-
-
-def test_a_silent_sensor_is_a_failure():
-    sensing = Sensing(FakeSensor([sample(1.0, 4.0)]), turned, np.zeros(6))
-    sensing.read(state(1.0))
-    sensing.read(state(1.09))
-    with pytest.raises(InstrumentError, match=r"silent for 0\.12 s"):
-        sensing.read(state(1.12))
-
-
-def test_a_sensor_that_never_speaks_is_a_failure():
-    sensing = Sensing(FakeSensor(), turned, np.zeros(6))
-    sensing.read(state(5.0))
-    with pytest.raises(InstrumentError, match="silent"):
-        sensing.read(state(5.2))
-
-
-def test_an_unhealthy_sample_is_a_failure():
-    sensing = Sensing(FakeSensor([sample(0.0, 1.0), sample(0.0, 1.0, False)]), turned, np.zeros(6))
-    with pytest.raises(InstrumentError, match="saturated"):
-        sensing.read(state(0.0))
-
-
-def test_rest_needs_samples():
-    clock = Clock()
-    assert at_rest(FakeSensor([sample(0.0, 2.0)]), clock, long=True).shape == (1, 6)
-    assert clock.t == 0.5
-    with pytest.raises(InstrumentError, match="sends nothing"):
-        at_rest(FakeSensor(), clock, long=False)
+    np.testing.assert_allclose(touch([sample(0.0, 4.0)]).feel(state(np.pi), 0.0)[2], -4.0)
 
 
 def law(clamp=5.0):
@@ -113,6 +77,15 @@ def test_it_moves_along_the_normal_only_and_away_when_pressed_hard(normal):
         moved = press.displace(0.0, push(normal, 9.0))
     assert moved @ np.asarray(normal) > 0.1
     np.testing.assert_allclose(np.cross(moved, normal), 0.0, atol=1e-12)
+
+
+def test_held_the_displacement_does_not_grow():
+    press = pressing()
+    for _ in range(20):
+        moved = press.displace(0.0, push(UP, 0.0))
+    assert moved[2] < -0.1
+    for _ in range(20):
+        np.testing.assert_array_equal(press.hold(0.0), moved)
 
 
 def test_forces_along_the_surface_do_not_move_it():

@@ -13,7 +13,7 @@ def run(cursor, brake_at=None, cycles=3000):
             cursor.brake()
         if cursor.finished:
             break
-        cursor.advance(1)
+        cursor.advance()
         indices.append(cursor.index)
         phases.append(cursor.phase)
     return np.array(indices), phases
@@ -30,15 +30,9 @@ def test_phases_follow_each_other():
     cursor = Cursor(made, WIDE)
     _, phases = run(cursor)
     assert phases == ["approach"] * made.lead + ["stroke"] * 501
-    cursor.advance(1)
+    cursor.advance()
     assert cursor.phase == "stop"
     assert cursor.index == len(made) - 1
-
-
-def test_a_skip_keeps_the_index_the_time():
-    cursor = Cursor(plan(), WIDE)
-    cursor.advance(4)
-    assert cursor.index == 4
 
 
 @pytest.mark.parametrize("at", [1, 50, 137, 250, 490, 499])
@@ -86,13 +80,13 @@ def test_it_waits_at_the_strokes_start_until_released():
     assert cursor.phase == "approach"
     assert not cursor.finished
     cursor.release()
-    cursor.advance(1)
+    cursor.advance()
     assert cursor.phase == "stroke"
     assert cursor.index == made.lead + 1
 
 
 def test_braking_while_it_waits_is_done_at_once():
     cursor = Cursor(plan(), WIDE, wait=True)
-    cursor.advance(1)
+    cursor.advance()
     cursor.brake()
     assert cursor.finished

@@ -1,3 +1,4 @@
+import dataclasses
 import signal
 
 import numpy as np
@@ -5,21 +6,49 @@ import pytest
 from streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, plan, stroke
 
 from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.instruments.interruption import Interruption
 from dmpcli.rotations import exp
-from dmpcli.streaming.interruption import Interruption
 from dmpcli.streaming.loop import DONE, Arm, Loop, Watch
 
 WATCH = Watch(5.0, 0.1, 50.0)
 
 
+PERIOD = 0.02
+# Of what the loop itself watches, the test's touch feels nothing.
+NOTHING = np.zeros(6)
+
+
+class FakeSensor:
+    """A sample with every poll, except where `silent`; `wrench` is what it senses."""
+
+    def __init__(self, clock, wrench=NOTHING, rate=100.0):
+        self.clock, self.wrench, self.silent = clock, wrench, False
+
+    def poll(self):
+        if self.silent:
+            return []
+        return [Sample(self.clock.now(), 1, np.array(self.wrench, dtype=float), True, 0)]
+
+
 class Bench:
-    def __init__(self, made=None, jumps=None, at=None, **servo):
+    def __init__(self, made=None, jumps=None, at=None, limits=WIDE, presses=False, **servo):
         self.plan = plan() if made is None else made
         self.clock = FakeClock(self.plan.period, jumps)
         self.servo = FakeServo(self.clock, at=at, **servo)
         self.interruption = Interruption()
-        self.loop = Loop(self.plan, WIDE, WATCH, Arm(self.servo, self.servo.info, self.clock))
+        arm = Arm(self.servo, self.servo.info, self.clock)
+        self.sensor = FakeSensor(self.clock)
+        self.loop = Loop(self.plan, limits, WATCH, arm, self.touch() if presses else None)
         self.log = self.loop.log
+
+    def touch(self):
+        """Feel in base axes, and seek the surface at 5 N / 2 N·s/mm = 2.5 mm/s."""
+        info = SensorInfo("fake", 100.0, np.full(6, 100.0))
+        sensing = Sensing(self.sensor, info, 100.0, PERIOD, self.clock)
+        model = admittance.Law(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
+        law = Law(model, 5.0, 5.0, 0.5, 0.1, 10.0)
+        pressing = Pressing(law, fast_filter(5.0, PERIOD), self.plan)
+        return Touch(sensing, lambda sensed, _: sensed, pressing)
 
     def run(self):
         return self.loop.run(self.interruption)
@@ -59,27 +88,35 @@ def test_a_small_delay_is_not_carried_on():
     assert len(bench.stroke_rows()) == 501
 
 
-def test_a_late_cycle_skips_and_the_index_stays_the_time():
-    """65 ms late at deadline 100: deadlines 100-102 are gone, number 103 is sent 5 ms late."""
+def test_after_a_late_cycle_the_plan_goes_on_from_where_it_is():
+    """65 ms late at deadline 100: deadlines 101-103 are gone, and the stroke ends 60 ms later."""
     bench = Bench(jumps={100: 0.065})
     outcome = bench.run()
     assert (outcome.reason, outcome.missed) == (DONE, 3)
-    rows = bench.log.rows
     np.testing.assert_allclose(
-        bench.column("deadline")[98:102], [1.96, 1.98, 2.06, 2.08], atol=1e-9
+        bench.column("deadline")[98:103], [1.96, 1.98, 2.0, 2.08, 2.1], atol=1e-9
     )
-    assert rows[100].lateness == pytest.approx(0.005)
-    for row in bench.stroke_rows():
-        assert np.array_equal(row.sent[0], bench.plan.position[round(row.deadline / 0.02)])
+    assert bench.log.rows[100].lateness == pytest.approx(0.065)
+    assert np.array_equal([row.sent[0] for row in bench.stroke_rows()], bench.plan.position)
     assert np.all(np.diff(bench.column("t")) > 0)
-    assert len(bench.stroke_rows()) == 501 - 3
+    assert bench.stroke_rows()[-1].deadline == pytest.approx(10.0 + 0.06)
 
 
-def test_a_late_first_cycle_skips_too():
-    """45 ms late at the very start: the first set-point sent is number 2, its due one."""
+def test_lateness_breaks_no_limit_that_was_checked_before():
+    """At 128 mm/s four set-points at once would be 512 mm/s; the limit is 250."""
+    bench = Bench(plan(stroke(duration=1.6)), jumps={30: 0.07, 40: 0.045, 50: 0.09})
+    assert bench.run().missed == 3 + 2 + 4
+    sent = np.array([row.sent[0] for row in bench.log.rows])
+    step = np.diff(sent, axis=0)
+    assert np.linalg.norm(step, axis=1).max() / PERIOD <= WIDE.speed
+    assert np.linalg.norm(np.diff(step, axis=0), axis=1).max() / PERIOD**2 <= WIDE.acceleration
+
+
+def test_a_late_first_cycle_begins_at_the_first_set_point():
     bench = Bench(jumps={0: 0.045})
     assert bench.run().missed == 2
-    assert np.array_equal(bench.log.rows[0].sent[0], bench.plan.position[2])
+    assert np.array_equal(bench.log.rows[0].sent[0], bench.plan.position[0])
+    assert bench.log.rows[1].deadline == pytest.approx(0.06)
 
 
 def test_no_two_set_points_leave_in_one_period_after_a_delay():
@@ -260,3 +297,124 @@ def test_an_arm_that_never_rests_is_reported():
     outcome = Bench(at={502: shake}).run()
     assert outcome.error is InstrumentError
     assert "does not come to rest" in outcome.reason
+
+
+# --- with the force coupling
+
+UP = (0.0, 0.0, 1.0)
+
+
+def pressing(**options):
+    return Bench(plan(stroke(normal=UP)), presses=True, **options)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_it_seeks_contact_ends_the_seeking(number):
+    """Seeking goes on at 2.5 mm/s towards the surface; from the signal on nothing may move."""
+    bench = pressing(at={40: lambda servo: bench.interruption.receive(number)})
+    outcome = bench.run()
+    assert (outcome.signal, outcome.error) == (number, None)
+    depth = START[2] - np.array([row.sent[0][2] for row in bench.log.rows])
+    assert depth[39] > 1.0
+    np.testing.assert_array_equal(depth[40:], depth[39])
+    assert len(depth) < 40 + 50
+
+
+def test_a_signal_on_the_stroke_freezes_the_displacement():
+    bench = pressing(at={200: lambda servo: bench.interruption.receive(signal.SIGINT)})
+    bench.sensor.wrench = np.array([0.0, 0.0, 5.1, 0.0, 0.0, 0.0])
+    assert bench.run().signal == signal.SIGINT
+    off = np.array([row.sent[0][2] - row.planned[0][2] for row in bench.log.rows])
+    assert bench.log.rows[199].phase == "stroke"
+    np.testing.assert_allclose(off[200:], off[199], atol=1e-12)
+
+
+def test_a_stale_sensor_does_not_drive_the_coupling():
+    """Four cycles of silence are no contact lost: the displacement waits for the next sample."""
+    bench = pressing()
+    bench.servo.at = {
+        100: lambda servo: setattr(bench.sensor, "silent", True),
+        104: lambda servo: setattr(bench.sensor, "silent", False),
+    }
+    bench.sensor.wrench = np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
+    bench.run()
+    rows = bench.log.rows
+    assert [row.wrench is None for row in rows[100:105]] == [False, False, True, True, False]
+    assert rows[102].coupling == rows[103].coupling == rows[101].coupling
+    assert rows[101].coupling < rows[100].coupling
+
+
+def test_a_displacement_out_of_the_workspace_is_not_sent():
+    box = (-900.0, 0.0, 0.0, 900.0, START[2] - 1.5, 100.0)
+    bench = pressing(limits=dataclasses.replace(WIDE, workspace=box))
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert "workspace" in outcome.reason
+    assert min(p[2] for p, _ in bench.servo.sent) >= box[4]
+    assert len(bench.log.rows) == len(bench.servo.sent) + 1
+
+
+def test_a_displacement_faster_than_the_limit_is_not_sent():
+    limits = dataclasses.replace(WIDE, speed=2.0)
+    outcome = pressing(limits=limits).run()
+    assert outcome.error is RefusedError
+    assert "next set-point would take 2." in outcome.reason
+
+
+def test_an_arm_outside_the_workspace_stops():
+    box = (-900.0, 0.0, 0.0, 900.0, START[2] - 1.0, START[2] + 1.0)
+
+    def push(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 1.2])
+
+    bench = Bench(limits=dataclasses.replace(WIDE, workspace=box), at={200: push})
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert "the tool at z" in outcome.reason
+    assert len(bench.servo.sent) == 200
+
+
+# --- what is not a number passes no guard
+
+
+@pytest.mark.parametrize("attribute", ["position", "rotation"])
+def test_a_pose_that_is_not_a_number_stops(attribute):
+    def lost(servo):
+        servo.stuck = True
+        setattr(servo, attribute, np.full_like(getattr(servo, attribute), np.nan))
+
+    bench = Bench(at={200: lost})
+    outcome = bench.run()
+    assert outcome.error is InstrumentError
+    assert "not a number" in outcome.reason
+    assert len(bench.servo.sent) == 200
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_wrench_that_is_not_a_number_stops(value):
+    bench = pressing()
+    wrench = np.array([0.0, 0.0, value, 0.0, 0.0, 0.0])
+    bench.servo.at = {30: lambda servo: setattr(bench.sensor, "wrench", wrench)}
+    outcome = bench.run()
+    assert outcome.error is InstrumentError
+    assert len(bench.servo.sent) == 30
+
+
+def test_a_set_point_that_is_not_a_number_is_never_sent():
+    made = plan()
+    made.position[300] = np.nan
+    bench = Bench(made)
+    outcome = bench.run()
+    assert outcome.error is RefusedError
+    assert len(bench.servo.sent) == 300
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_the_first_failure_is_the_one_told():
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    bench = Bench(at={200: lambda servo: setattr(servo, "mode", "fault")})
+    bench.servo.stop = unreachable
+    assert "fault" in bench.run().reason

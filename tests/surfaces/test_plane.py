@@ -121,6 +121,16 @@ def test_a_given_plane_is_flipped_to_the_tools_side():
     assert up.height(np.array([3.0, 4.0, 5.0])) == 5.0
 
 
+def test_a_given_normal_stays_where_the_tool_lies_in_the_plane():
+    for sign in (1.0, -1.0):
+        wall = Plane(np.zeros(3), np.array([sign, 0.0, 0.0]))
+        for tilt in (1e-5, -1e-5):
+            tool = np.array([tilt, 0.0, -1.0])
+            np.testing.assert_array_equal(wall.facing(tool).normal, wall.normal)
+    towards_x = np.array([1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(wall.facing(towards_x).normal, [-1.0, 0.0, 0.0])
+
+
 def test_charts_know_their_number_and_normals():
     charts = PlaneCharts(np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)))
     assert len(charts) == 4

@@ -1,7 +1,7 @@
 import os
 import signal
 
-from dmpcli.streaming.interruption import Interruption
+from dmpcli.instruments.interruption import Interruption
 
 
 def test_signals_are_counted_while_it_is_entered():

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.drag.compensation import Compensation, LowPass, dead_band, rest_zero
 from dmpcli.primitives import wrench
+from dmpcli.primitives.compensation import Compensation, LowPass, dead_band, rest_zero
 from dmpcli.primitives.wrench import Tool
 from dmpcli.rotations import exp
 

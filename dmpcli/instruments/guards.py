@@ -1,0 +1,205 @@
+"""What no loop may let pass: an arm not ready, lost, late or straying; and how to leave the bench.
+
+A comparison with NaN is false, so every guard here says what it accepts, not what it refuses.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.instruments.protocols import RobotState, ServoInfo
+
+Box = tuple[float, float, float, float, float, float]
+"""xmin, xmax, ymin, ymax, zmin, zmax, mm, base frame."""
+
+LAG = 0.1
+"""The actual pose may lag the set-points by this much more than the look-ahead, s."""
+
+
+def ordered(box: Box) -> Box:
+    """Return a workspace whose minima lie below its maxima.
+
+    Raises
+    ------
+    ValueError
+        They do not.
+    """
+    if not all(low < high for low, high in zip(box[::2], box[1::2], strict=True)):
+        raise ValueError("each minimum of the workspace must lie below its maximum")
+    return box
+
+
+def check_state(state: RobotState, box: Box | None = None) -> None:
+    """Refuse to go on where the arm is not ready, or not where it may be.
+
+    Parameters
+    ----------
+    state : RobotState
+    box : tuple of float, optional
+        The workspace.
+
+    Raises
+    ------
+    RefusedError
+        The mode forbids motion, or the tool is outside the workspace.
+    InstrumentError
+        The pose is not a number.
+    """
+    if state.mode != "ready":
+        raise RefusedError(f"robot: {state.mode}; clear it on the pendant and try again")
+    if not (np.isfinite(state.position).all() and np.isfinite(state.rotation).all()):
+        raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
+    check_inside(state.position, box, "the tool")
+
+
+def check_inside(position: Floats, box: Box | None, what: str) -> None:
+    """Refuse a position outside the workspace.
+
+    Parameters
+    ----------
+    position : array, shape (3,)
+        mm.
+    box : tuple of float or None
+        None is no bound.
+    what : str
+        Whose position it is, for the message.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if box is None:
+        return
+    for axis, value, low, high in zip("xyz", position, box[::2], box[1::2], strict=True):
+        if not low <= value <= high:
+            raise RefusedError(
+                f"{what} at {axis} = {value:.3f} mm leaves the workspace ({low:g} to {high:g} mm)"
+            )
+
+
+def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:
+    """Refuse to send what is not a pose, or one outside the workspace.
+
+    Parameters
+    ----------
+    position, rotation : array, shape (3,) and (3, 3)
+        mm.
+    box : tuple of float or None
+
+    Raises
+    ------
+    RefusedError
+    """
+    if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+        raise RefusedError("the next set-point is not a number and was not sent; check settings")
+    check_inside(position, box, "the next set-point")
+
+
+def check_late(late: float, info: ServoInfo, period: float) -> None:
+    """Refuse a cycle that woke later than half the look-ahead, or than one period if that is more.
+
+    An arm that takes set-points at once has no look-ahead.
+
+    Parameters
+    ----------
+    late : float
+        s after the deadline.
+    info : ServoInfo
+    period : float
+        s.
+
+    Raises
+    ------
+    RefusedError
+    """
+    limit = max(info.lookahead / 2.0, period)
+    if not late <= limit:
+        raise RefusedError(
+            f"{1e3 * late:.0f} ms late, over {1e3 * limit:.0f} ms (half the robot's look-ahead); "
+            "use a quieter computer or a longer look-ahead"
+        )
+
+
+class Trail:
+    """The set-points just sent, which the actual pose must stay near.
+
+    They reach back over the look-ahead and a tenth of a second: what a look-ahead delays is no
+    error, what stands still or strays is.
+
+    Parameters
+    ----------
+    info : ServoInfo
+    period : float
+        s.
+    distance, angle : float
+        How far the arm may stray from the nearest of them, mm and rad.
+    """
+
+    def __init__(self, info: ServoInfo, period: float, distance: float, angle: float) -> None:
+        window = int(np.ceil((info.lookahead + LAG) / period)) + 1
+        self._sent: deque[tuple[Floats, Floats]] = deque(maxlen=window)
+        self._distance, self._angle = distance, angle
+
+    @property
+    def last(self) -> tuple[Floats, Floats] | None:
+        """The set-point sent last."""
+        return self._sent[-1] if self._sent else None
+
+    def add(self, position: Floats, rotation: Floats) -> None:
+        """Remember a set-point that was sent."""
+        self._sent.append((position, rotation))
+
+    def strayed(self, state: RobotState) -> tuple[float, float]:
+        """Distance and angle to the nearest set-point, mm and rad; 0 before the first."""
+        if not self._sent:
+            return 0.0, 0.0
+        positions = np.array([p for p, _ in self._sent])
+        traces = np.einsum("nij,ij->n", np.array([R for _, R in self._sent]), state.rotation)
+        cosine = np.clip((traces.max() - 1.0) / 2.0, -1.0, 1.0)
+        distance = np.linalg.norm(positions - state.position, axis=1).min()
+        return float(distance), float(np.arccos(cosine))
+
+    def check(self, state: RobotState) -> None:
+        """Refuse to go on where the arm does not follow.
+
+        Raises
+        ------
+        RefusedError
+        """
+        distance, angle = self.strayed(state)
+        if not (distance <= self._distance and angle <= self._angle):
+            raise RefusedError(
+                f"following error {distance:.2f} mm, {angle:.3f} rad is over "
+                f"{self._distance:g} mm, {self._angle:g} rad"
+            )
+
+
+def leave(*deeds: Callable[[], None]) -> InstrumentError | None:
+    """Do every one of the deeds, in order, whatever any of them raises.
+
+    Parameters
+    ----------
+    *deeds : callable
+        Such as `Servo.stop`, `Servo.close` and `Sensor.close`.
+
+    Returns
+    -------
+    InstrumentError or None
+        The first failure of an instrument; a defect is raised, after the last deed.
+    """
+    failures: list[InstrumentError] = []
+
+    def attempt(deed: Callable[[], None]) -> None:
+        try:
+            deed()
+        except InstrumentError as failure:
+            failures.append(failure)
+
+    with ExitStack() as left:
+        for deed in reversed(deeds):
+            left.callback(attempt, deed)
+    return failures[0] if failures else None
