@@ -87,7 +87,7 @@ def main() -> None:
         heights = []
         for experiment in EXPERIMENTS:
             pairs = Pairs(np.array([experiment.start]), np.array([experiment.goal]))
-            drawn = draw(result.skill, pairs, np.array([10.0]), result.skill.frame.normal, Style())[
+            drawn = draw(result.skill, pairs, np.array([10.0]), None, Style())[
                 0
             ]
             heights.append(height(drawn.position, drawn.normal))

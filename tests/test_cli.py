@@ -10,7 +10,7 @@ import dmpcli
 from dmpcli import cli
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 
-COMMANDS = ["record", "fit", "generalize", "execute", "report", "inspect"]
+COMMANDS = ["record", "fit", "generalize", "execute", "report", "inspect", "register"]
 HEAVY = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "rich", "pydantic"}
 
 
