@@ -1,7 +1,7 @@
 # dmpcli: set-up, tests, the demonstration and the paper's experiments.
 #
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
-#   make reproduce   the paper's flat experiments, target by target
+#   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
 #   make bench       the timings that the README quotes
 #
@@ -44,6 +44,8 @@ bench: .venv/installed
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python benchmarks/human_strokes.py
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/mesh_load.py
+	$(BIN)/python -m benchmarks.surfaces
 
 # One stroke through the whole tool-chain, against the mock lab.
 
@@ -63,26 +65,32 @@ demo: .venv/installed
 	@$(MAKE) --no-print-directory reproduce
 	@printf '\nFigures: %s\n' "$(DEMO)/report, $(DEMO)/batch-report and $(R)/*/report"
 
-# The paper's flat experiments (section 3.2.1): Tables 1 and 2, Figures 5 to 8; and the drag
-# comparison of Figures 3 and 4. Twice: from the noise-free reference stroke, and from a stroke
-# recorded with the mock lab.
+# The paper's flat experiments (section 3.2.1): Tables 1 and 2, Figures 5 to 8; the curved one
+# (section 3.2.2): Figure 9; and the drag comparison of Figures 3 and 4. Twice: from the noise-free
+# reference stroke, and from a stroke recorded with the mock lab.
 
 STROKES    := reference recorded
 SKILLS     := modified ridge paper axis distance
 PAIR_1     := --reproduce
 PAIR_2     := --start -701.698 132.420 -17.538 --goal -807.597 129.739 -17.518
+PAIR_CURVED := --start -551.698 -37.580 -28.765 --goal -657.597 -43.254 -32.265
+BENCH      := sample_runs/bench.stl
+CURVED     := modified axis distance
 FIT_modified :=
 FIT_ridge    := --regression ridge
 FIT_paper    := --preset paper
 FIT_axis     := --preset paper --model original --forcing-scale axis
 FIT_distance := --preset paper --model original --forcing-scale distance
 R          := $(OUT)/reproduce
-REPORTS    := $(STROKES:%=$(R)/%/report/report.json)
+DRAW_modified := --orientation surface
+REPORTS    := $(foreach s,$(STROKES),$(R)/$(s)/report/report.json $(R)/$(s)/curved/report.json)
 
 reproduce: $(REPORTS) $(STROKES:%=$(R)/%/tables.txt) $(R)/drag/report/report.json $(R)/drag/tables.txt
 	@for stroke in $(STROKES); do \
 	    printf '\n== Tables 1 and 2 from the %s stroke ==\n' $$stroke; \
 	    cat $(R)/$$stroke/tables.txt; \
+	    printf '\n== Figure 9 from the %s stroke ==\n' $$stroke; \
+	    cat $(R)/$$stroke/curved.txt; \
 	done
 	@printf '\n== Admittance drag and built-in drag (Figures 3 and 4) ==\n'
 	@cat $(R)/drag/tables.txt
@@ -98,10 +106,19 @@ $(R)/$(1)/$(2)-table2.parquet: $(R)/$(1)/$(2).json
 endef
 $(foreach stroke,$(STROKES),$(foreach skill,$(SKILLS),$(eval $(call FIT_RULES,$(stroke),$(skill)))))
 
+define CURVED_RULE
+$(R)/$(1)/$(2)-fig9.parquet: $(R)/$(1)/$(2).json $(BENCH)
+	$(DMPCLI) generalize $$< -o $$@ $(PAIR_CURVED) --surface $(BENCH) $(DRAW_$(2))
+endef
+$(foreach stroke,$(STROKES),$(foreach skill,$(CURVED),$(eval $(call CURVED_RULE,$(stroke),$(skill)))))
+
 define REPORT_RULE
 $(R)/$(1)/report/report.json $(R)/$(1)/tables.txt &: sample_runs/$(1).parquet \
     $(foreach t,1 2,$(SKILLS:%=$(R)/$(1)/%-table$(t).parquet))
 	$(DMPCLI) report $$^ -o $(R)/$(1)/report > $(R)/$(1)/tables.txt
+$(R)/$(1)/curved/report.json $(R)/$(1)/curved.txt &: sample_runs/$(1).parquet \
+    $(CURVED:%=$(R)/$(1)/%-fig9.parquet)
+	$(DMPCLI) report $$^ --surface $(BENCH) -o $(R)/$(1)/curved > $(R)/$(1)/curved.txt
 endef
 $(foreach stroke,$(STROKES),$(eval $(call REPORT_RULE,$(stroke))))
 
@@ -128,6 +145,8 @@ pictures: reproduce
 
 samples: .venv/installed
 	$(BIN)/python sample_runs/make_reference.py sample_runs/reference.parquet
+	$(BIN)/python sample_runs/make_surfaces.py sample_runs
+	$(BIN)/python sample_runs/make_surfaces.py sample_runs
 	$(DMPCLI) record -o sample_runs/recorded.parquet --config sample_runs/recorded.toml --seed 1
 
 schemas: .venv/installed

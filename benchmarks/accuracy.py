@@ -88,9 +88,7 @@ def main() -> None:
         heights = []
         for experiment in EXPERIMENTS:
             pairs = Pairs(np.array([experiment.start]), np.array([experiment.goal]))
-            drawn = draw(result.skill, pairs, np.array([10.0]), result.skill.frame.normal, Style())[
-                0
-            ]
+            drawn = draw(result.skill, pairs, np.array([10.0]), None, Style())[0]
             heights.append(height(drawn.position, experiment, drawn.normal))
         print(
             f"| {name} | {r.rms:.5f} | {r.end:.5f} | {heights[0]:.3f} | {heights[1]:.3f} "

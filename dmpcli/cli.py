@@ -9,12 +9,17 @@ import typer
 from typer.core import TyperGroup
 
 from dmpcli import __version__
-from dmpcli.commands import execute, fit, generalize, inspect, record, report
+from dmpcli.commands import execute, fit, generalize, inspect, record, register, report
+from dmpcli.commands.pose_words import joined
 from dmpcli.errors import DmpError
 
 
 class Group(TyperGroup):
     """Turns a user's mistake into one message and its exit code; a defect keeps its traceback."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words after the program's name; poses of six words become one value."""
+        return super().parse_args(ctx, joined(args))
 
     def invoke(self, ctx: Any) -> Any:
         """Run the subcommand."""
@@ -44,6 +49,7 @@ app.command("generalize")(generalize.command)
 app.command("execute")(execute.command)
 app.command("report")(report.command)
 app.command("inspect")(inspect.command)
+app.command("register")(register.command)
 
 
 def _version(asked: bool) -> None:

@@ -11,7 +11,7 @@ import dmpcli
 from dmpcli import cli
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 
-COMMANDS = ["record", "fit", "generalize", "execute", "report", "inspect"]
+COMMANDS = ["record", "fit", "generalize", "execute", "report", "inspect", "register"]
 ROOT = Path(__file__).parents[1]
 HEAVY = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "rich", "pydantic"}
 

@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
     from dmpcli.records.record import Provenance
-    from dmpcli.surfaces.plane import Plane
-
-PAIRS_PER_PART = 2000
+    from dmpcli.surfaces.protocol import Surface
 
 SHOWN = 20
 """Bad pairs that are named on the terminal; all are in the dataset's table."""
@@ -52,8 +50,23 @@ def command(
         typer.Option(help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration]."),
     ] = None,
     surface: Annotated[
-        Path | None, typer.Option(help="Plane to draw on, plane.json: point and normal.")
+        Path | None,
+        typer.Option(help="What to draw on: plane.json (point and normal), or an STL, OBJ or PLY."),
     ] = None,
+    surface_pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X Y Z RX RY RZ|pose.json",
+            help="Where the surface's own frame lies in the base frame, mm and rad.",
+        ),
+    ] = None,
+    surface_unit: Annotated[
+        str | None, typer.Option(help="Unit of a mesh file: mm (default), cm, m or in.")
+    ] = None,
+    on_border: Annotated[
+        str,
+        typer.Option(help="A stroke that leaves the surface: fail, clip it there, or skip it."),
+    ] = "fail",
     duration: Annotated[
         float | None, typer.Option(help="Of the stroke, s. Default: as demonstrated.")
     ] = None,
@@ -84,7 +97,6 @@ def command(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
 ) -> None:
     """Draw a skill at new start and goal points."""
-    from dmpcli.records import plane as plane_file
     from dmpcli.records import skill as skill_file
     from dmpcli.records import streams
     from dmpcli.records.generalize_settings import GeneralizeSettings
@@ -116,18 +128,21 @@ def command(
             "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
             "--start-orientation and --goal-orientation out"
         )
+    if on_border not in ("fail", "clip", "skip"):
+        raise InputError(f"--on-border {on_border}: must be fail, clip or skip")
+    if surface is None and (surface_pose is not None or surface_unit is not None):
+        raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
     _check_destination(output, start, goal, pairs, reproduce)
     source = streams.read(skill)
     learned, _ = skill_file.decode(source)
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
-    plane = None
-    if surface is not None:
-        surface_source = streams.read(surface)
-        inputs.append({"role": "surface", "sha256": surface_source.sha256})
-        plane = plane_file.decode(surface_source)
     options = settings.model_dump()
+    found = None
+    if surface is not None:
+        options |= {"surface_unit": surface_unit or "mm", "on_border": on_border}
+        found = _surface(surface, surface_pose, surface_unit, options, inputs, quiet)
     if pairs is None:
         assert start is not None
         assert goal is not None
@@ -141,15 +156,15 @@ def command(
         inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
         options["on_error"] = on_error
     _check_asked(learned, table, settings)
-    given = None
-    if plane is not None:
-        given = _facing(plane, learned, table, str(surface), quiet)
+    given = None if found is None else _facing(found, learned, table, str(surface), quiet)
     _judge(learned, table, given, settings, on_error)
     provenance = Provenance("generalize", options, tuple(inputs))
     if pairs is None:
-        _write_one(learned, table, given, settings, provenance, output, quiet)
+        _write_one(learned, table, given, settings, provenance, output, on_border, quiet)
     else:
-        _write_batch(learned, table, given, settings, provenance, output, quiet)
+        _write_batch(
+            learned, table, given, settings, provenance, output, on_error, on_border, quiet
+        )
 
 
 def _check_destination(
@@ -214,13 +229,52 @@ def _one_pair(
     )
 
 
-def _facing(plane: "Plane", skill: "Skill", table: "PairTable", name: str, quiet: bool) -> "Plane":
-    """Turn the plane's normal to the tool's side, and say so where that flips it."""
+def _surface(
+    path: Path,
+    pose: str | None,
+    unit: str | None,
+    options: dict[str, Any],
+    inputs: list[dict[str, str]],
+    quiet: bool,
+) -> "Surface":
+    """Read the surface, place it in the base frame, and say what is odd about it."""
+    from dmpcli.commands.messages import tell
+    from dmpcli.records import mesh as mesh_file
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import streams, surface
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.plane import Plane
+
+    source = streams.read(path)
+    inputs.append({"role": "surface", "sha256": source.sha256})
+    placed = None
+    if pose is not None:
+        placed, pose_source = pose_file.parse(pose, "--surface-pose")
+        if pose_source is None:
+            options["surface_pose"] = [float(word) for word in pose.split()]
+        else:
+            inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
+    found = surface.load(source, unit, placed)
+    if isinstance(found, Plane):
+        return found
+    for remark in found.remarks:
+        tell(f"{path}: {remark}", quiet)
+    tell(f"{path}: {mesh_file.summary(found)}", quiet)
+    return Mesh(found.V, found.F)
+
+
+def _facing(
+    surface: "Surface", skill: "Skill", table: "PairTable", name: str, quiet: bool
+) -> "Surface":
+    """Turn a plane's normal to the tool's side, and say so where that flips it."""
     from dmpcli.commands.messages import tell
     from dmpcli.primitives.admission import tool_axis
+    from dmpcli.surfaces.plane import Plane
 
-    facing = plane.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
-    if facing.normal @ plane.normal < 0:
+    if not isinstance(surface, Plane):
+        return surface  # the charts of a mesh look for the tool's side at each start
+    facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
+    if facing.normal @ surface.normal < 0:
         tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
     return facing
 
@@ -247,7 +301,7 @@ def _check_asked(skill: "Skill", table: "PairTable", settings: "GeneralizeSettin
 def _judge(
     skill: "Skill",
     table: "PairTable",
-    given: "Plane | None",
+    given: "Surface | None",
     settings: "GeneralizeSettings",
     on_error: str,
 ) -> None:
@@ -299,7 +353,7 @@ def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
         return f"more than {MOST_SAMPLES} samples; shorten --duration or lower --rate"
     if verdict.far[i]:
         return (
-            f"start or goal lies {verdict.distance[i]:.3f} mm off the plane, more than "
+            f"start or goal lies {verdict.distance[i]:.3f} mm off the surface, more than "
             f"--snap-tol {tolerance:g}; move the point, or raise the tolerance"
         )
     return (
@@ -308,42 +362,51 @@ def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
     )
 
 
-def _normal(skill: "Skill", given: "Plane | None") -> Any:
-    return skill.frame.normal if given is None else given.normal
-
-
 def _write_one(
     skill: "Skill",
     table: "PairTable",
-    given: "Plane | None",
+    given: "Surface | None",
     settings: "GeneralizeSettings",
     provenance: "Provenance",
     output: Path,
+    on_border: str,
     quiet: bool,
 ) -> None:
     from dataclasses import replace
 
     import numpy as np
 
-    from dmpcli.commands.messages import about, tell
+    from dmpcli.commands.messages import about, tell, warn
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.drawing import draw
-    from dmpcli.records import record, streams, trajectory
+    from dmpcli.records import dataset, record, streams, trajectory
+    from dmpcli.records.pairs import OK
 
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     duration = _durations(skill, table, settings)
+    task = dataset.Task(skill, given, settings.style(), on_border)
     with about("skill"):
-        stroke = draw(skill, pairs, duration, _normal(skill, given), settings.style())[0]
+        drawn = draw(skill, pairs, duration, given, task.style)[0]
+    stroke, status = dataset.settled(task, drawn)
+    if status != OK:
+        raise RefusedError(f"{status}; move start and goal, or choose another surface")
     facts = trajectory.facts_of(skill) | trajectory.facts_of_stroke(
         stroke, settings.rate, pairs.start[0], pairs.goal[0]
     )
     done = trajectory.trajectory_record(table.ids, [stroke], replace(provenance, facts=facts))
     streams.write(output, record.encode(done))
-    moved = np.linalg.norm([pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2)
-    if moved.max() > 0:
-        tell(
-            f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the plane", quiet
+    if given is not None:
+        moved = np.linalg.norm(
+            [pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2
         )
+        tell(
+            f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface",
+            quiet,
+        )
+    if stroke.unfolded:
+        warn("the stroke crosses a sharp crease, where no tool can follow the surface")
+    if len(stroke.position) < len(drawn.position):
+        warn(f"clipped at the border: {len(stroke.position)} of {len(drawn.position)} poses")
     miss = np.linalg.norm(stroke.position[-1] - pairs.goal[0])
     tell(
         f"{streams.shown(output, output=True)}: {skill.model} DMP, {len(stroke.position)} poses, "
@@ -355,58 +418,34 @@ def _write_one(
 def _write_batch(
     skill: "Skill",
     table: "PairTable",
-    given: "Plane | None",
+    given: "Surface | None",
     settings: "GeneralizeSettings",
     provenance: "Provenance",
     output: Path,
+    on_error: str,
+    on_border: str,
     quiet: bool,
 ) -> None:
-    """Write part files in pair order, and last `pairs.parquet` with a status per pair."""
-    from dataclasses import replace
-
-    import numpy as np
-
     from dmpcli.commands.messages import about, progress, tell, warn
     from dmpcli.primitives.admission import snapped
-    from dmpcli.primitives.drawing import draw
-    from dmpcli.records import record, streams, trajectory
+    from dmpcli.records import dataset, streams
     from dmpcli.records.pairs import OK
 
-    pairs = table.pairs if given is None else snapped(table.pairs, given)
-    good = np.flatnonzero(table.good)
-    if len(good) == 0:
+    if not table.good.any():
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
-    duration = _durations(skill, table, settings)
-    lasting = duration.copy()
-    normal = np.full((len(table), 3), np.nan)
-    part_of = [""] * len(table)
-    facts = trajectory.facts_of(skill) | {"rate": settings.rate}
-    with streams.dataset(output) as folder, progress("drawing", len(good), quiet) as advance:
-        for number, first in enumerate(range(0, len(good), PAIRS_PER_PART)):
-            rows = good[first : first + PAIRS_PER_PART]
-            name = f"part-{number:05d}.parquet"
-            with about("skill"):
-                strokes = draw(
-                    skill, pairs[rows], duration[rows], _normal(skill, given), settings.style()
-                )
-            for row, stroke in zip(rows, strokes, strict=True):
-                normal[row], lasting[row] = stroke.normal, stroke.timing.t[-1]
-                part_of[row] = name
-            done = trajectory.trajectory_record(
-                [table.ids[row] for row in rows], strokes, replace(provenance, facts=facts)
-            )
-            streams.write(folder / name, record.encode(done))
-            advance(len(rows))
-        done = trajectory.pairs_record(
-            table.ids,
+    pairs = table.pairs if given is None else snapped(table.pairs, given)
+    task = dataset.Task(skill, given, settings.style(), on_border)
+    with progress("drawing", int(table.good.sum()), quiet) as advance, about("skill"):
+        dataset.write(
+            output,
+            task,
+            table,
             pairs,
-            lasting,
-            normal,
-            part_of,
-            table.status,
-            replace(provenance, facts=facts),
+            _durations(skill, table, settings),
+            provenance,
+            on_error == "stop",
+            advance,
         )
-        streams.write(folder / streams.TABLE, record.encode(done))
     bad = [status for status in table.status if status != OK]
     for status in bad[:SHOWN]:
         tell(f"{table.name}: skipped: {status}", quiet)
@@ -414,9 +453,8 @@ def _write_batch(
         tell(
             f"{table.name}: and {len(bad) - SHOWN} more; {output}/{streams.TABLE} names all", quiet
         )
-    skipped = len(table) - len(good)
-    summary = f"{output}: {len(good)} strokes drawn, {skipped} pairs skipped"
-    if skipped:
+    summary = f"{output}: {len(table) - len(bad)} strokes drawn, {len(bad)} pairs skipped"
+    if bad:
         warn(summary)
     else:
         tell(summary, quiet)

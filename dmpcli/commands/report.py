@@ -10,6 +10,7 @@ from dmpcli.errors import InputError
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
     from dmpcli.figures.document import Part
+    from dmpcli.figures.footing import Ground
     from dmpcli.figures.measured import Row
 
 _WIDTH = 80
@@ -27,7 +28,19 @@ def command(
     ],
     surface: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="plane.json that the strokes lie on."),
+        typer.Option(
+            metavar="FILE", help="What the strokes lie on: plane.json, or an STL, OBJ or PLY."
+        ),
+    ] = None,
+    surface_pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X Y Z RX RY RZ|pose.json",
+            help="Where the surface's own frame lies in the base frame, mm and rad.",
+        ),
+    ] = None,
+    surface_unit: Annotated[
+        str | None, typer.Option(help="Unit of a mesh file: mm (default), cm, m or in.")
     ] = None,
     output: Annotated[
         Path | None,
@@ -47,15 +60,21 @@ def command(
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
+    if surface is None and (surface_pose is not None or surface_unit is not None):
+        raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
     if output is not None and output.exists() and not output.is_dir():
         raise InputError(f"{output}: is a file, -o needs the name of a folder")
-    normal = None if surface is None else _normal(surface)
+    ground, said, normal = None, None, None
+    if surface is not None:
+        ground, said, normal = _ground(surface, surface_pose, surface_unit, quiet)
     labels = stroke.labels_of(files)
     parts = [_part(name, label, normal) for name, label in zip(files, labels, strict=True)]
-    report = document.document(parts)
+    if ground is not None:
+        parts = _placed(parts, ground, quiet)
+    report = document.document(parts, said)
     if output is not None:
         _make_folder(output)
-        written = _write(output, report, parts)
+        written = _write(output, report, parts, ground)
         tell(f"{output}: wrote {', '.join(written)}", quiet)
     if as_json:
         streams.say(document.as_json(report))
@@ -106,10 +125,53 @@ def _batch(folder: Path, label: str, normal: "Floats | None") -> "Part":
     return Part(label, source.sha256, schemas.PAIRS.name, strokes, states=states)
 
 
-def _normal(surface: Path) -> "Floats":
-    from dmpcli.records import plane, streams
+def _ground(
+    path: Path, pose: str | None, unit: str | None, quiet: bool
+) -> "tuple[Ground, Row, Floats | None]":
+    """Read the surface and place it; also what the report says of it, and a plane's normal."""
+    from dmpcli.commands.messages import tell
+    from dmpcli.figures.footing import Ground
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import streams, surface
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.plane import Plane
 
-    return plane.decode(streams.read(surface)).normal
+    source = streams.read(path)
+    said: Row = {"file": path.name, "sha256": source.sha256, "unit": unit or "mm", "pose": None}
+    placed = None
+    if pose is not None:
+        placed, pose_source = pose_file.parse(pose, "--surface-pose")
+        if pose_source is None:
+            said["pose"] = [float(word) for word in pose.split()]
+        else:
+            said["pose"] = {"sha256": pose_source.sha256}
+    found = surface.load(source, unit, placed)
+    if isinstance(found, Plane):
+        return Ground(path.name, found), said, found.normal
+    for remark in found.remarks:
+        tell(f"{path}: {remark}", quiet)
+    mesh = Mesh(found.V, found.F)
+    return Ground(path.name, mesh, mesh.V, mesh.F), said, None
+
+
+def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
+    """Measure how every trajectory and run lies on the surface."""
+    from dataclasses import replace
+
+    from dmpcli.commands.messages import progress
+    from dmpcli.figures.document import reference_of
+    from dmpcli.figures.footing import placed
+
+    reference = reference_of(parts)
+    done = []
+    with progress("measuring", sum(len(part.strokes) for part in parts), quiet) as advance:
+        for part in parts:
+            strokes = []
+            for stroke in part.strokes:
+                strokes.append(placed(stroke, ground, reference))
+                advance(1)
+            done.append(replace(part, strokes=strokes))
+    return done
 
 
 def _make_folder(output: Path) -> None:
@@ -122,7 +184,7 @@ def _make_folder(output: Path) -> None:
         raise InputError(f"{output}: cannot be made: {error.strerror}") from None
 
 
-def _write(output: Path, report: "Row", parts: "list[Part]") -> list[str]:
+def _write(output: Path, report: "Row", parts: "list[Part]", ground: "Ground | None") -> list[str]:
     """Write each file whole; return their names."""
     from dmpcli.figures import document
     from dmpcli.figures.gallery import gallery
@@ -132,7 +194,7 @@ def _write(output: Path, report: "Row", parts: "list[Part]") -> list[str]:
     files = {
         "report.json": document.as_json(report),
         "wave_heights.csv": document.as_csv(parts),
-        **gallery(strokes),
+        **gallery(strokes, ground),
     }
     # Figures of an earlier report that this one does not draw would be taken for its own.
     for old in output.glob("fig[0-9]_*.*"):

@@ -16,10 +16,21 @@ from dmpcli.records.record import Record
 from dmpcli.records.skill import SkillFile
 
 NAME, VERSION = "report", 1
-UNITS = {"length": "mm", "time": "s", "speed": "mm/s", "ldlj": "1", "sparc": "1"}
+UNITS = {
+    "length": "mm",
+    "time": "s",
+    "speed": "mm/s",
+    "ldlj": "1",
+    "sparc": "1",
+    "tilt": "degree",
+    "stretch": "1",
+}
 
 MOST_ROWS = 20
 """A file of more strokes than this is reported by its statistics."""
+
+LEAST_LIFT = 5e-4
+"""Heights over the demonstration's plane below this are not spoken of, mm."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +67,15 @@ def reference_of(parts: Sequence[Part]) -> Stroke | None:
     return next((s for s in taught if s.role == "demonstration"), taught[0] if taught else None)
 
 
-def document(parts: Sequence[Part]) -> Row:
+def document(parts: Sequence[Part], surface: Row | None = None) -> Row:
     """Measure everything; the same inputs give the same document.
 
     Parameters
     ----------
     parts : sequence of Part
         In the order of the command line.
+    surface : dict, optional
+        Name and provenance of the surface that the strokes were placed on.
     """
     reference = reference_of(parts)
     strokes = [stroke for part in parts for stroke in part.strokes]
@@ -72,6 +85,7 @@ def document(parts: Sequence[Part]) -> Row:
         "tool": __version__,
         "units": UNITS,
         "reference": reference.label if reference else None,
+        "surface": surface,
         "files": [_entry(part, reference) for part in parts],
         "paper": paper_tables.comparisons(strokes),
     }
@@ -116,6 +130,7 @@ def as_text(report: Row, width: int) -> str:
         parts += [tables.shape(rows), *_remarks(report, rows), ""]
         for table in (tables.waves(rows), tables.motion(rows), tables.drag(rows)):
             parts += [table, ""] if table else []
+        parts += _on_surface(report, rows)
     for entry in report["files"]:
         if entry["statistics"]:
             parts += [tables.statistics(entry["file"], entry), ""]
@@ -150,6 +165,26 @@ def _entry(part: Part, reference: Stroke | None) -> Row:
 
 def _rows(report: Row) -> list[Row]:
     return [row for entry in report["files"] for row in entry["strokes"]]
+
+
+def _on_surface(report: Row, rows: Sequence[Row]) -> list[Table | str]:
+    """Tables of how the strokes lie on the surface, and what there is to say about them."""
+    if report["surface"] is None:
+        return []
+    parts: list[Table | str] = []
+    for table in (tables.on_surface(report["surface"]["file"], rows), tables.along_surface(rows)):
+        parts += [table, ""] if table else []
+    remarks = []
+    for row in rows:
+        lies = row["surface"]
+        if lies and lies["remark"]:
+            remarks.append(f"{row['stroke']}: no wave height along the surface: {lies['remark']}.")
+        if lies and (lies["lifted_max"] or 0.0) >= LEAST_LIFT:
+            remarks.append(
+                f"{row['stroke']}: off the surface after taking off the demonstration's own height "
+                f"over its plane, up to {lies['lifted_max']:.4f} mm."
+            )
+    return [*parts, *remarks, ""] if remarks else parts
 
 
 def _remarks(report: Row, rows: Sequence[Row]) -> list[str]:

@@ -7,9 +7,11 @@ from matplotlib.figure import Figure
 
 from dmpcli.figures import drawing
 from dmpcli.figures.drawing import Curve, curve_of
+from dmpcli.figures.footing import Ground
 from dmpcli.figures.plane_curves import plane_curves
 from dmpcli.figures.stroke import Stroke
 from dmpcli.figures.style import STYLES
+from dmpcli.figures.surface_view import surface_view
 from dmpcli.figures.time_curves import time_curves
 
 MOST_PLACES = 4
@@ -19,13 +21,19 @@ MOST_CURVES = 200
 """Strokes drawn in that one figure; of more, an even choice."""
 
 
-def gallery(strokes: Sequence[Stroke]) -> dict[str, bytes]:
+MOST_NAMED = 6
+"""Strokes on a surface that the legend names one by one; of more, their roles."""
+
+
+def gallery(strokes: Sequence[Stroke], ground: Ground | None = None) -> dict[str, bytes]:
     """Draw the figures that the strokes call for.
 
     Parameters
     ----------
     strokes : sequence of Stroke
         In the order of the command line.
+    ground : Ground, optional
+        The surface that they were placed on.
 
     Returns
     -------
@@ -33,11 +41,14 @@ def gallery(strokes: Sequence[Stroke]) -> dict[str, bytes]:
         File names (SVG and PNG) and contents. Figure 4: several demonstrations, or one with the
         curve it followed. Figures 5 and 6: what lies where the first demonstration lies, against
         time and on the plane. Figures 7 and 8: likewise elsewhere, the demonstration carried
-        there.
+        there. Figure 9: on a surface that was given, in space.
     """
     files = {}
     with drawing.settings():
-        for name, figure in _figures(strokes).items():
+        figures = _figures(strokes)
+        if ground is not None and any(stroke.footing for stroke in strokes):
+            figures["fig9_surface"] = _on_surface(strokes, ground)
+        for name, figure in figures.items():
             for suffix, content in drawing.saved(figure).items():
                 files[f"{name}.{suffix}"] = content
     return files
@@ -115,6 +126,13 @@ def _named(strokes: Sequence[Stroke], drag: bool = False) -> list[Curve]:
 
 def _on_plane(curves: Sequence[Curve], at: Stroke) -> Figure:
     return plane_curves(curves, at.start, at.goal, at.axes)
+
+
+def _on_surface(strokes: Sequence[Stroke], ground: Ground) -> Figure:
+    placed = [stroke for stroke in strokes if stroke.footing]
+    step = -(-len(placed) // MOST_CURVES)
+    reference = next((s for s in strokes if s.kind == "demonstration"), None)
+    return surface_view(placed[::step], ground, reference, plain=len(placed) > MOST_NAMED)
 
 
 def _overview(places: Sequence[Sequence[Stroke]], first: Stroke | None) -> Figure:

@@ -14,7 +14,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.figures import tables
 from dmpcli.figures.measured import Row
-from dmpcli.records import plane, record, recordings, schemas, skill, tool
+from dmpcli.records import plane, pose, record, recordings, schemas, skill, tool
 from dmpcli.records import tables as records_tables
 from dmpcli.records.streams import Source
 
@@ -152,15 +152,22 @@ _READERS: dict[Any, Callable[[Source], object]] = {
     "skill": skill.decode,
     "plane": plane.decode,
     "tool": tool.decode,
+    "pose": pose.decode,
 }
 """Their readers name what is wrong with a damaged file."""
 
-_SCHEMAS = {"skill": skill.schema, "plane": plane.schema, "tool": tool.schema}
+_SCHEMAS = {
+    "skill": skill.schema,
+    "plane": plane.schema,
+    "tool": tool.schema,
+    "pose": pose.schema,
+}
 
 _MEANINGS = {
     "skill": "What fit learned of a stroke, all that generalize needs.",
     "plane": "A plane in the robot's base frame, mm.",
     "tool": "Where the tool's tip and the sensor sit on the flange, and the payload.",
+    "pose": "Where a part's own frame lies in the robot's base frame.",
     "report": "What report measured.",
     "inspection": "What inspect found in a file.",
 }

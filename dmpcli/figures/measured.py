@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from dmpcli.arrays import Floats
 from dmpcli.figures.stroke import Stroke
-from dmpcli.measures import path
+from dmpcli.measures import path, surface
 from dmpcli.measures.deviation import deviation, nearest_distance
 from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
 from dmpcli.measures.timing import punctuality
@@ -51,6 +52,41 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
         "sparc": _finite(spectral_arc_length(stroke.t, stroke.raw)),
         "start_error": start_error if stroke.intended else None,
         "goal_error": goal_error if stroke.intended else None,
+        "surface": _on_surface(stroke),
+    }
+
+
+def _on_surface(stroke: Stroke) -> Row | None:
+    """How a stroke lies on the report's surface; see `Footing`."""
+    footing = stroke.footing
+    if footing is None:
+        return None
+    wave, tilt = footing.wave, footing.tilt
+    pieces = None if footing.uv is None else surface.stretch(footing.foot, footing.uv)
+    length = path.path_length(footing.foot)
+    taught = footing.demonstrated
+    meant = None if taught is None else path.path_length(taught[:, :2])
+    start_error, goal_error = path.end_errors(stroke.position, footing.start, footing.goal)
+    return {
+        "distance_max": float(footing.distance.max()),
+        "distance_rms": _rms(footing.distance),
+        "height_least": float(footing.height.min()),
+        "height_largest": float(footing.height.max()),
+        "lifted_max": footing.lifted,
+        "wave_height": None if wave is None else wave.mean,
+        "wave_spread": None if wave is None else wave.spread,
+        "wave_heights": None if wave is None else wave.heights.tolist(),
+        "geodesic": footing.length,
+        "tilt_max": None if tilt is None else float(np.degrees(tilt.max())),
+        "tilt_mean": None if tilt is None else float(np.degrees(tilt.mean())),
+        "length": length,
+        "demonstrated_length": meant,
+        "length_change": None if meant is None else length / meant - 1.0,
+        "stretch_least": None if pieces is None else float(pieces.min() - 1.0),
+        "stretch_largest": None if pieces is None else float(pieces.max() - 1.0),
+        "start_error": start_error,
+        "goal_error": goal_error,
+        "remark": footing.remark,
     }
 
 
@@ -63,7 +99,7 @@ def deadlines_of(run: Record) -> Row:
     return {
         "period": _finite(period),
         **asdict(punctuality(deadline, lateness, period)),
-        "tracking_rms": float(np.sqrt(np.mean(off**2))),
+        "tracking_rms": _rms(off),
         "tracking_max": float(off.max()),
     }
 
@@ -89,6 +125,10 @@ def statistics_of(rows: Sequence[Row]) -> Row:
         **{
             key: [row[key] for row in rows]
             for key in ("length", "duration", "ldlj", "sparc", "start_error", "goal_error")
+        },
+        **{
+            f"surface_{key}": [(row["surface"] or {}).get(key) for row in rows]
+            for key in ("distance_max", "tilt_max", "length_change")
         },
     }
     return {key: _spread([x for x in column if x is not None]) for key, column in values.items()}
@@ -123,7 +163,7 @@ def _as_recorded(stroke: Stroke) -> Row | None:
     raw = replace(stroke, position=stroke.raw)
     return {
         "wave_height": raw.wave.mean,
-        "removed_rms": float(np.sqrt(np.mean(removed**2))),
+        "removed_rms": _rms(removed),
         "removed_max": float(removed.max()),
     }
 
@@ -131,6 +171,13 @@ def _as_recorded(stroke: Stroke) -> Row | None:
 def _deviation(stroke: Stroke, reference: Stroke | None) -> Row | None:
     if reference is None or reference is stroke:
         return None
+    footing = stroke.footing
+    if stroke.axes is None and footing and footing.place is not None:
+        if footing.demonstrated is None:
+            return None
+        # On a curved surface strokes are compared in its chart.
+        taught = footing.demonstrated
+        return asdict(deviation(stroke.t, footing.place, reference.t, taught))
     aligned = reference.carried_to(stroke)
     if aligned is None:
         return None
@@ -142,7 +189,11 @@ def _from_guide(stroke: Stroke) -> Row | None:
     if stroke.guide is None:
         return None
     apart = nearest_distance(stroke.raw, stroke.guide)
-    return {"rms": float(np.sqrt(np.mean(apart**2))), "max": float(apart.max())}
+    return {"rms": _rms(apart), "max": float(apart.max())}
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _finite(value: float) -> float | None:

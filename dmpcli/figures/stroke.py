@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.streams import DASH
 from dmpcli.surfaces import plane
+
+if TYPE_CHECKING:
+    from dmpcli.figures.footing import Footing
 
 NEAR = 1.0
 """Strokes whose starts and goals are this near to each other lie at the same place, mm."""
@@ -58,6 +61,14 @@ class Stroke:
         No arm was there.
     guide : array, shape (m, 3), optional
         The curve that a demonstration was dragged along, where the file tells it, mm.
+    rotation : array, shape (n, 3, 3), optional
+        Of the tool, of trajectories and runs that hold it.
+    side : array, shape (3,), optional
+        Normal on the tool's side where the stroke begins, as far as the file tells it.
+    bound : bool
+        Whether it was meant to lie on a surface: the original model knows none.
+    footing : Footing, optional
+        How the stroke lies on a surface that it was measured on.
     """
 
     label: str
@@ -73,12 +84,18 @@ class Stroke:
     intended: bool
     simulated: bool
     guide: Floats | None = None
+    rotation: Floats | None = None
+    side: Floats | None = None
+    bound: bool = True
+    footing: "Footing | None" = None
 
     @cached_property
     def wave(self) -> WaveHeights:
-        """Its wave heights; none for a line, a closed stroke or a curved surface."""
-        if self.closed or self.axes is None:
+        """Its wave heights; on a curved surface along it. None for a line or a closed stroke."""
+        if self.closed:
             return _NONE
+        if self.axes is None:
+            return (self.footing and self.footing.wave) or _NONE
         return stroke_wave(self.position, self.start, self.goal, self.axes[:, 2])
 
     @property
@@ -198,7 +215,8 @@ def demonstrated(
         seen.closed,
         False,
         bool(origin.facts.get("simulated", False)),
-        _guide(origin.facts.get("reference")),
+        # A noise-free stroke is its own guide.
+        None if origin.facts.get("noise_free") else _guide(origin.facts.get("reference")),
     )
 
 
@@ -253,7 +271,20 @@ def _planned(
         closed,
         intended,
         bool(known.get("simulated", record.provenance.facts.get("simulated", False))),
+        rotation=record.rotation(),
+        side=_side(record, known),
+        bound=known.get("model") != "original",
     )
+
+
+def _side(record: Record, known: Mapping[str, Any]) -> Floats | None:
+    """Return the normal on the tool's side at the start, by the file or by its tool."""
+    if known.get("normal") is not None:
+        return np.asarray(known["normal"], dtype=float)
+    if record.has(*schemas.NORMAL):
+        return np.asarray(record.stack(schemas.NORMAL)[0])
+    rotation = record.rotation()
+    return None if rotation is None else -rotation[0, :, 2]
 
 
 def _normal(known: Mapping[str, Any], record: Record) -> Floats | None:

@@ -91,6 +91,56 @@ def motion(rows: Sequence[Row]) -> Table:
     return table
 
 
+def on_surface(name: str, rows: Sequence[Row]) -> Table | None:
+    """Wave height along the surface, distance to it, tool against normal; None without strokes."""
+    placed = [(row["stroke"], row["surface"]) for row in rows if row["surface"]]
+    if not placed:
+        return None
+    table = _table(
+        f"On the surface ({name}), mm and degrees",
+        "stroke",
+        *("height", "spread", "off max", "off RMS", "tilt max", "tilt mean"),
+    )
+    for stroke, lies in placed:
+        table.add_row(
+            stroke,
+            number(lies["wave_height"], 3),
+            number(lies["wave_spread"], 3),
+            number(lies["distance_max"], 4),
+            number(lies["distance_rms"], 4),
+            number(lies["tilt_max"], 2),
+            number(lies["tilt_mean"], 2),
+        )
+    return table
+
+
+def along_surface(rows: Sequence[Row]) -> Table | None:
+    """Length against the demonstration's, stretch of the pieces, and ends; None without strokes."""
+    placed = [(row["stroke"], row["surface"]) for row in rows if row["surface"]]
+    if not placed:
+        return None
+    table = _table(
+        "Along the surface, mm and percent",
+        "stroke",
+        *("length", "change", "pieces from", "to", "start off", "goal off"),
+    )
+    for stroke, lies in placed:
+        table.add_row(
+            stroke,
+            number(lies["length"], 2),
+            _percent(lies["length_change"]),
+            _percent(lies["stretch_least"]),
+            _percent(lies["stretch_largest"]),
+            number(lies["start_error"], 4),
+            number(lies["goal_error"], 4),
+        )
+    return table
+
+
+def _percent(share: float | None) -> str:
+    return _NOTHING if share is None else f"{100.0 * share:+.2f} %"
+
+
 def deadlines(runs: Sequence[tuple[str, Row]]) -> Table:
     """Lateness of each run's set-points, and how closely the arm followed them."""
     table = _table(
@@ -123,7 +173,12 @@ def statistics(name: str, row: Row) -> Table:
         ("sparc", "SPARC", 2),
         ("start_error", "start off, mm", 4),
         ("goal_error", "goal off, mm", 4),
+        ("surface_distance_max", "off the surface, mm", 4),
+        ("surface_tilt_max", "off the normal, degrees", 2),
+        ("surface_length_change", "length over demonstrated, 1", 5),
     ):
+        if key.startswith("surface") and row["statistics"][key] is None:
+            continue
         spread = row["statistics"][key] or {}
         table.add_row(
             title, *(number(spread.get(k), digits) for k in ("least", "median", "largest"))

@@ -9,6 +9,7 @@ from dmpcli.primitives.drawing import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.plane import Plane
+from dmpcli.surfaces.protocol import Surface
 
 # Start and goal of an open stroke this near to each other have no direction, mm.
 COINCIDENT = 1e-6
@@ -27,7 +28,7 @@ class Admission:
     coincident : array of bool
         An open stroke's start and goal are one point.
     far : array of bool
-        Start or goal is further from the given plane than the tolerance.
+        Start or goal is further from the given surface than the tolerance.
     upright : array of bool
         The start-goal line stands upright on the plane, so that no chart follows.
     short : array of bool
@@ -35,7 +36,7 @@ class Admission:
     endless : array of bool
         The trajectory would have more than `MOST_SAMPLES` samples.
     distance : array, shape (B,)
-        The larger distance of start and goal from the given plane, mm; 0 without one.
+        The larger distance of start and goal from the given surface, mm; 0 without one.
     """
 
     coincident: Booleans
@@ -56,10 +57,10 @@ def admit(
     pairs: Pairs,
     duration: Floats,
     style: Style,
-    given: Plane | None,
+    given: Surface | None,
     tolerance: float,
 ) -> Admission:
-    """Check pairs against a skill and, where there is one, the plane to draw on.
+    """Check pairs against a skill and, where there is one, the surface to draw on.
 
     Parameters
     ----------
@@ -69,9 +70,9 @@ def admit(
     duration : array, shape (B,)
         Of each stroke without easing, s.
     style : Style
-    given : Plane, optional
+    given : Surface, optional
     tolerance : float
-        Largest distance from the plane, mm.
+        Largest distance from the surface, mm.
 
     Returns
     -------
@@ -82,11 +83,13 @@ def admit(
     coincident = np.zeros(len(pairs), dtype=bool) if skill.closed else length < COINCIDENT
     distance = np.zeros(len(pairs))
     if given is not None:
-        heights = np.abs([given.height(pairs.start), given.height(pairs.goal)])
-        distance = np.max(heights, axis=0)
-    normal = skill.frame.normal if given is None else given.normal
+        ends = (given.closest(pairs.start).distance, given.closest(pairs.goal).distance)
+        distance = np.maximum(*ends)
     upright = np.zeros(len(pairs), dtype=bool)
-    if not skill.closed and skill.model == "modified":
+    # Only planes can be missed: on a curved surface the geodesic tells the direction.
+    flat = given is None or isinstance(given, Plane)
+    if flat and not skill.closed and skill.model == "modified":
+        normal = given.normal if isinstance(given, Plane) else skill.frame.normal
         along = np.abs(difference @ normal) / np.where(coincident, 1.0, length)
         upright = ~coincident & (along > UPRIGHT)
     short = 2.0 * duration < style.ease_in + style.ease_out
@@ -94,10 +97,9 @@ def admit(
     return Admission(coincident, distance > tolerance, upright, short, endless, distance)
 
 
-def snapped(pairs: Pairs, given: Plane) -> Pairs:
-    """Return the pairs with start and goal moved onto the plane along its normal."""
-    start = pairs.start - given.height(pairs.start)[:, None] * given.normal
-    goal = pairs.goal - given.height(pairs.goal)[:, None] * given.normal
+def snapped(pairs: Pairs, given: Surface) -> Pairs:
+    """Return the pairs with start and goal moved to their closest points of the surface."""
+    start, goal = given.closest(pairs.start).position, given.closest(pairs.goal).position
     return Pairs(start, goal, pairs.start_rotation, pairs.goal_rotation)
 
 

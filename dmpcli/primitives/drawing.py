@@ -1,15 +1,17 @@
 """Drawing a skill at many pairs of differing durations: charts, timing, roll-out."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.primitives.generalization import Amplitude, Orientation, Pairs, curves, roll_out
 from dmpcli.primitives.retiming import Timing, timing
 from dmpcli.primitives.skill import Skill
-from dmpcli.surfaces.plane import pair_charts
+from dmpcli.surfaces.plane import Plane, pair_charts
+from dmpcli.surfaces.protocol import Charts, Status, Surface
 
 
 @dataclass(frozen=True)
@@ -45,20 +47,43 @@ class Stroke:
         mm.
     euler : array, shape (T, 3), or None
         Unwrapped X-Y-Z Euler angles, rad.
-    normal : array, shape (3,)
-        Unit normal of its plane.
+    normal : array, shape (1 or T, 3), or None
+        Unit normals: one for a plane, else one per sample; None for the original model on a
+        curved surface, which it does not know.
+    status : Status
+        Whether it could be drawn; positions mean nothing where it could not.
+    outside : array of bool, shape (1 or T,)
+        Samples beyond the surface's border.
+    unfolded : bool
+        Whether it crosses a sharp crease, where a tool cannot follow the surface.
     """
 
     timing: Timing
     position: Floats
     euler: Floats | None
-    normal: Floats
+    normal: Floats | None
+    status: Status
+    outside: Booleans
+    unfolded: bool
+
+    def until_border(self) -> "Stroke":
+        """Return the part before the first sample beyond the border; at least one sample."""
+        inside = np.broadcast_to(~self.outside, len(self.position))
+        count = max(1, int(np.argmin(inside)) if not inside.all() else len(inside))
+        t = replace(self.timing, t=self.timing.t[:count], stroke=self.timing.stroke[:count])
+        euler = None if self.euler is None else self.euler[:count]
+        normal = self.normal
+        if normal is not None and len(normal) > 1:
+            normal = normal[:count]
+        return Stroke(
+            t, self.position[:count], euler, normal, Status.DRAWN, self.outside[:count], False
+        )
 
 
 def draw(
-    skill: Skill, pairs: Pairs, duration: Floats, normal: Floats, style: Style
+    skill: Skill, pairs: Pairs, duration: Floats, surface: Surface | None, style: Style
 ) -> list[Stroke]:
-    """Draw a skill at every pair; pairs of one duration are one matrix product.
+    """Draw a skill at every pair; pairs of one duration are drawn together.
 
     Parameters
     ----------
@@ -67,8 +92,8 @@ def draw(
         B pairs that `admit` lets pass.
     duration : array, shape (B,)
         Of each stroke without easing, s.
-    normal : array, shape (3,)
-        See `pair_charts`.
+    surface : Surface or None
+        What to draw on; a plane's normal is on the tool's side. Without one each pair has its own plane, parallel to the demonstration's.
     style : Style
 
     Returns
@@ -81,10 +106,9 @@ def draw(
     InputError
         The skill's own numbers overflow.
     """
-    strokes: list[Stroke | None] = [None] * len(pairs)
+    strokes: list[Stroke] = [None] * len(pairs)  # type: ignore[list-item]
     for seconds in np.unique(duration):
         rows = np.flatnonzero(duration == seconds)
-        some = pairs[rows]
         when = timing(
             float(seconds),
             style.rate,
@@ -93,14 +117,46 @@ def draw(
             style.ease_in,
             style.ease_out,
         )
-        charts = pair_charts(some.start, some.goal, normal, skill.closed)
-        with np.errstate(over="ignore", invalid="ignore"):
-            drawn = roll_out(
-                skill, curves(skill, when.stroke), some, charts, style.amplitude, style.orientation
-            )
-        if not np.isfinite(drawn.position).all():
-            raise InputError("the skill's numbers give no finite stroke; fit it again")
-        for i, row in enumerate(rows):
-            euler = None if drawn.euler is None else drawn.euler[i]
-            strokes[row] = Stroke(when, drawn.position[i], euler, drawn.normal[i])
-    return [stroke for stroke in strokes if stroke is not None]
+        for row, stroke in zip(rows, _drawn(skill, pairs[rows], when, surface, style), strict=True):
+            strokes[row] = stroke
+    return strokes
+
+
+def _drawn(
+    skill: Skill, pairs: Pairs, when: Timing, surface: Surface | None, style: Style
+) -> Iterator[Stroke]:
+    charts = None if skill.model == "original" else charts_of(skill, pairs, surface)
+    shared = curves(skill, when.stroke)
+    with np.errstate(over="ignore", invalid="ignore"):
+        drawn = roll_out(skill, shared, pairs, charts, style.amplitude, style.orientation)
+    lift = drawn.lift
+    usable = slice(None) if lift is None else lift.status == Status.DRAWN
+    if not np.isfinite(drawn.position[usable]).all():
+        raise InputError("the skill's numbers give no finite stroke; fit it again")
+    for i in range(len(pairs)):
+        euler = None if drawn.euler is None else drawn.euler[i]
+        if lift is not None:
+            normal: Floats | None = lift.normal[i]
+            status, outside = Status(lift.status[i]), lift.outside[i]
+            unfolded = bool(lift.unfolded[i])
+        else:
+            flat = surface is None or isinstance(surface, Plane)
+            plane_normal = surface.normal if isinstance(surface, Plane) else skill.frame.normal
+            normal = plane_normal[None] if flat else None
+            status, outside, unfolded = Status.DRAWN, np.zeros(1, dtype=bool), False
+        yield Stroke(when, drawn.position[i], euler, normal, status, outside, unfolded)
+
+
+def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None) -> Charts:
+    """Charts that a skill is drawn in at these pairs; see `draw`."""
+    if surface is None:
+        return pair_charts(pairs.start, pairs.goal, skill.frame.normal, skill.closed)
+    closed = skill.frame.axes if skill.closed else None
+    if isinstance(surface, Plane):
+        side: Floats | None = surface.normal
+    elif pairs.start_rotation is not None:
+        side = -pairs.start_rotation[..., 2]
+    else:
+        R = skill.frame.rotation
+        side = None if R is None else -R[:, 2]
+    return surface.charts(pairs.start, pairs.goal, side, closed)

@@ -9,7 +9,9 @@ from dmpcli import rotations
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import RefusedError
 from dmpcli.primitives.skill import Skill
+from dmpcli.surfaces.orientation import smoothed
 from dmpcli.surfaces.plane import PlaneCharts
+from dmpcli.surfaces.protocol import Charts, Lift
 
 Amplitude = Literal["keep", "scale"]
 Orientation = Literal["keep", "surface"]
@@ -60,13 +62,14 @@ class Trajectories:
         mm.
     euler : array, shape (B, T, 3), or None
         Unwrapped X-Y-Z Euler angles, rad; None for a skill without orientation.
-    normal : array, shape (B, 3)
-        Unit normal of each pair's surface.
+    lift : Lift or None
+        Axes, border and status of the strokes on their surface; None for the original model, which
+        knows no surface.
     """
 
     position: Floats
     euler: Floats | None
-    normal: Floats
+    lift: Lift | None
 
 
 def curves(skill: Skill, stroke: Floats) -> Floats:
@@ -99,7 +102,7 @@ def roll_out(
     skill: Skill,
     shared: Floats,
     pairs: Pairs,
-    charts: PlaneCharts,
+    charts: Charts | None,
     amplitude: Amplitude = "keep",
     orientation: Orientation = "keep",
 ) -> Trajectories:
@@ -112,8 +115,8 @@ def roll_out(
         Of `curves`.
     pairs : Pairs
         B pairs.
-    charts : PlaneCharts
-        One per pair; the original model takes only their normals.
+    charts : Charts or None
+        One per pair, of any surface; None for the original model.
     amplitude : {'keep', 'scale'}
         Whether v keeps its size or scales with the start-goal distance, as u does.
     orientation : {'keep', 'surface'}
@@ -123,59 +126,82 @@ def roll_out(
     -------
     Trajectories
     """
-    turn = _turn(skill, pairs, charts, orientation) if skill.oriented else None
-    start, goal = _ends(skill, pairs, charts)
-    scale = _scale(skill, goal - start, None if turn is None else turn.goal, amplitude)
-    # Per pair: columns for a, b and the three forced coordinates; an affine chart commutes with
-    # the linear roll-out, so that one matrix product gives positions in the base frame.
-    coefficients = np.zeros((len(pairs), 3, 5))
+    if charts is None:
+        start, goal = pairs.start, pairs.goal
+        scale = _original_scale(skill, pairs)
+        position = _combined(_coefficients(start, goal, scale), shared)
+        frames = np.eye(3)[None, None]
+        lift = None
+    else:
+        goal = charts.goals
+        scale = _modified_scale(skill, goal, amplitude)
+        lift = _lift(charts, _coefficients(np.zeros_like(goal), goal, scale), shared)
+        position = lift.position
+        frames = skill.frame.axes[None, None]
+        if orientation == "surface":
+            frames = lift.axes if lift.axes.shape[1] == 1 else smoothed(lift.axes, position)
+    euler = None
+    if skill.oriented:
+        turn = _turn(skill, pairs, frames, turned=orientation == "surface" and lift is not None)
+        euler = np.broadcast_to(_euler(turn, shared, scale), position.shape)
+    return Trajectories(position, euler, lift)
+
+
+def _coefficients(start: Floats, goal: Floats, scale: Floats) -> Floats:
+    """Factors (B, 3, 5) of the first five shared curves: a, b and the three forced coordinates."""
+    coefficients = np.zeros((len(start), 3, 5))
     coefficients[:, :, _START] = start
     coefficients[:, :, _GOAL] = goal
     coefficients[:, [0, 1, 2], [2, 3, 4]] = scale[:, :3]
-    if skill.model == "modified":
-        coefficients = charts.axes @ coefficients
-        # a + b = 1 carries the origin.
-        coefficients[:, :, [_START, _GOAL]] += charts.origin[:, :, None]
+    return coefficients
+
+
+def _combined(coefficients: Floats, shared: Floats) -> Floats:
+    """Linear combinations of the shared curves, shape (B, T, 3): one matrix product."""
     flat = coefficients.reshape(-1, 5) @ shared[:5]
-    position = flat.reshape(len(pairs), 3, -1).transpose(0, 2, 1)
+    return flat.reshape(len(coefficients), 3, -1).transpose(0, 2, 1)
+
+
+def _lift(charts: Charts, coefficients: Floats, shared: Floats) -> Lift:
+    if not isinstance(charts, PlaneCharts):
+        return charts.lift(_combined(coefficients, shared))
+    # An affine chart commutes with the linear roll-out: the product gives base positions at once.
+    coefficients = charts.axes @ coefficients
+    # a + b = 1 carries the origin.
+    coefficients[:, :, [_START, _GOAL]] += charts.origin[:, :, None]
+    position = _combined(coefficients, shared)
     # Rounding of a product must not leave the start beside the point that was asked for.
-    position[:, 0] = pairs.start
-    euler = None
-    if turn is not None:
-        euler = np.broadcast_to(_euler(turn, shared, scale), position.shape)
-    return Trajectories(position, euler, charts.normal)
+    position[:, 0] = charts.origin
+    count = len(charts)
+    return Lift(
+        position,
+        charts.axes[:, None],
+        np.zeros((count, 1), dtype=bool),
+        charts.status,
+        np.zeros(count, dtype=bool),
+    )
 
 
-def _ends(skill: Skill, pairs: Pairs, charts: PlaneCharts) -> tuple[Floats, Floats]:
-    """x0 and g of the positions in the skill's coordinates, shape (B, 3)."""
-    if skill.model == "original":
-        return pairs.start, pairs.goal
-    goal = charts.coordinates(pairs.goal[:, None])[:, 0]
+def _modified_scale(skill: Skill, goal: Floats, amplitude: Amplitude) -> Floats:
+    """S per pair and axis (B, 6): how forcing and V0 scale with the goals (B, 3) in the chart."""
+    scale = np.ones((len(goal), 6))
     if not skill.closed:
-        # The chart runs from start to goal: v and w of the goal are rounding only.
-        goal[:, 1:] = 0.0
-    return np.zeros_like(goal), goal
+        scale[:, 0] = goal[:, 0] / skill.goal[0]
+        if amplitude == "scale":
+            scale[:, 1] = scale[:, 0]
+    return scale
 
 
-def _scale(
-    skill: Skill, difference: Floats, goal_angles: Floats | None, amplitude: Amplitude
-) -> Floats:
-    """S per pair and axis (B, 6): how the forcing and V0 scale with g - x0 (B, 3)."""
-    scale = np.ones((len(difference), 6))
-    if skill.model == "modified":
-        if not skill.closed:
-            scale[:, 0] = difference[:, 0] / skill.goal[0]
-            if amplitude == "scale":
-                scale[:, 1] = scale[:, 0]
-        return scale
-    # Original: the factor of eq. (7) by that of the demonstration.
-    factor = np.broadcast_to(skill.forcing_factor, scale.shape).copy()
+def _original_scale(skill: Skill, pairs: Pairs) -> Floats:
+    """S per pair and axis (B, 6): the factor of eq. (7) by that of the demonstration."""
+    difference = pairs.goal - pairs.start
+    factor = np.broadcast_to(skill.forcing_factor, (len(pairs), 6)).copy()
     if skill.forcing_scale == "distance":
         factor[:, :3] = np.linalg.norm(difference, axis=1)[:, None]
     else:
         factor[:, :3] = difference
-        if goal_angles is not None:
-            factor[:, 3:] = goal_angles
+        if skill.oriented:
+            factor[:, 3:] = _turn(skill, pairs, np.eye(3)[None, None]).goal
     return np.where(skill.exempt, 1.0, factor / skill.forcing_factor)
 
 
@@ -185,8 +211,8 @@ class _Turn:
 
     Attributes
     ----------
-    frames : array, shape (1 or B, 3, 3)
-        C: E is in these axes.
+    frames : array, shape (1 or B, 1 or T, 3, 3)
+        C(t): E is in these axes.
     first : array, shape (1 or B, 3, 3)
         R(0).
     goal : array, shape (1 or B, 3)
@@ -198,28 +224,23 @@ class _Turn:
     goal: Floats
 
 
-def _turn(skill: Skill, pairs: Pairs, charts: PlaneCharts, orientation: Orientation) -> _Turn:
+def _turn(skill: Skill, pairs: Pairs, frames: Floats, turned: bool = False) -> _Turn:
+    """Turn of the tool in `frames`; `turned`: R(0) stands to them as R_demo(0) to C_d."""
     R = skill.frame.rotation
     assert R is not None
-    first = R[None]
-    if skill.model == "original":
-        frames = np.eye(3)[None]
-    elif orientation == "keep":
-        frames = skill.frame.axes[None]
-    else:
-        frames = charts.axes
-        first = charts.axes @ skill.frame.axes.T @ R
+    begin, end = frames[:, 0], frames[:, -1]
+    first = begin @ skill.frame.axes.T @ R if turned else R[None]
     if pairs.start_rotation is not None:
         first = pairs.start_rotation
     goal = skill.goal[None, 3:]
     if pairs.goal_rotation is not None:
-        E = np.swapaxes(frames, -1, -2) @ pairs.goal_rotation @ np.swapaxes(first, -1, -2) @ frames
+        E = np.swapaxes(end, -1, -2) @ pairs.goal_rotation @ np.swapaxes(first, -1, -2) @ begin
         goal = rotations.to_euler(E)
     return _Turn(frames, first, goal)
 
 
 def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
-    """Tool orientations R(t) = C E(t) Cᵀ R(0) as unwrapped angles, shape (1 or B, T, 3).
+    """Tool orientations R(t) = C(t) E(t) C(0)ᵀ R(0) as unwrapped angles, shape (1 or B, T, 3).
 
     C is the demonstration's chart for `keep`, the pair's for `surface`; the original model turns
     about the base axes.
@@ -229,5 +250,5 @@ def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
         scale = scale[:1]
     angles = turn.goal[:, None] * shared[_GOAL][:, None] + scale[:, None, 3:] * shared[5:].T
     E = rotations.from_euler(angles)
-    C = turn.frames[:, None]
-    return rotations.to_euler_continuous(C @ E @ np.swapaxes(C, -1, -2) @ turn.first[:, None])
+    begin = np.swapaxes(turn.frames[:, :1], -1, -2) @ turn.first[:, None]
+    return rotations.to_euler_continuous(turn.frames @ E @ begin)

@@ -4,9 +4,9 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from dmpcli.records import plane, skill, tool
+from dmpcli.records import plane, pose, skill, tool
 
-SCHEMAS = {"skill": skill.schema, "plane": plane.schema, "tool": tool.schema}
+SCHEMAS = {"skill": skill.schema, "plane": plane.schema, "tool": tool.schema, "pose": pose.schema}
 
 
 def folder() -> Path:

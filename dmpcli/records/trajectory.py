@@ -30,14 +30,16 @@ def facts_of(skill: Skill) -> dict[str, Any]:
 
 def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) -> dict[str, Any]:
     """Return what is so for one stroke alone: its tau, ends and plane."""
-    return {
+    facts = {
         "tau": stroke.timing.tau,
         "duration": float(stroke.timing.t[-1]),
         "rate": rate,
         "start": start.tolist(),
         "goal": goal.tolist(),
-        "normal": stroke.normal.tolist(),
     }
+    if stroke.normal is not None and len(stroke.normal) == 1:
+        facts["normal"] = stroke.normal[0].tolist()
+    return facts
 
 
 def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenance) -> Record:
@@ -48,7 +50,7 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenan
     ids : sequence of str
         Of each stroke.
     strokes : sequence of Stroke
-        At least one; all with orientation or all without.
+        At least one; all with orientation or all without, all flat or all on a curved surface.
     p : Provenance
     """
     columns: dict[str, AnyArray] = {
@@ -61,6 +63,10 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenan
     if angles:
         euler = np.concatenate(angles)
         columns |= {name: euler[:, i] for i, name in enumerate(EULER_ANGLES)}
+    normals = [s.normal for s in strokes if s.normal is not None and len(s.normal) > 1]
+    if normals:
+        normal = np.concatenate(normals)
+        columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
     return Record(schemas.TRAJECTORY, columns, p)
 
 

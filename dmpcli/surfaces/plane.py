@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, Integers
+from dmpcli.surfaces.protocol import Connections, Hits, Lift, Status, Walks, towards
+from dmpcli.surfaces.vectors import across, dot, length, turned, unit
 
 # A stroke this close to its start-goal line, by its extent, does not tell its plane.
 STRAIGHT = 1e-3
@@ -47,6 +49,40 @@ class Plane:
         height: Floats = (np.asarray(position, dtype=float) - self.point) @ self.normal
         return height
 
+    def closest(self, points: Floats) -> Hits:
+        """Feet of the perpendiculars, see `Surface`."""
+        height = self.height(points)
+        position = np.asarray(points, dtype=float) - height[..., None] * self.normal
+        normal = np.broadcast_to(self.normal, position.shape)
+        return Hits(position, normal, np.abs(height), np.full(height.shape, -1))
+
+    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Walks:
+        """Walk straight lines, see `Surface`."""
+        heading = across(direction, self.normal)
+        position = origin + np.asarray(length, dtype=float)[..., None] * heading
+        normal = np.broadcast_to(self.normal, position.shape)
+        heading = np.broadcast_to(heading, position.shape)
+        return Walks(position, heading, normal, np.ones(position.shape[:-1], dtype=bool))
+
+    def connect(self, start: Floats, goal: Floats) -> Connections:
+        """Straight lines, see `Surface`."""
+        way = goal - start
+        way = way - dot(way, self.normal) * self.normal
+        size = length(way)[..., 0]
+        return Connections(unit(way), size, np.where(size > 0.0, Status.DRAWN, Status.COINCIDENT))
+
+    def charts(
+        self, start: Floats, goal: Floats, side: Floats | None = None, closed: Floats | None = None
+    ) -> "PlaneCharts":
+        """Lay charts, see `Surface`; start and goal are moved onto the plane along its normal."""
+        start, goal = self.closest(start).position, self.closest(goal).position
+        normal = np.broadcast_to(self.normal, start.shape)
+        normal = normal * towards(normal, side)
+        if closed is None:
+            return pair_charts(start, goal, normal, closed=False)
+        e_u = across(turned(closed[:, 0], closed[:, 2], normal), normal)
+        return PlaneCharts(start, open_axes(e_u, normal), goal, closed=True)
+
 
 @dataclass(frozen=True)
 class PlaneCharts:
@@ -58,10 +94,16 @@ class PlaneCharts:
         Where u = v = w = 0: the start, mm.
     axes : array, shape (B, 3, 3)
         C, columns e_u, e_v, n.
+    goal : array, shape (B, 3), optional
+        mm; the start where it is not given.
+    closed : bool
+        Whether the axes are those of closed strokes.
     """
 
     origin: Floats
     axes: Floats
+    goal: Floats | None = None
+    closed: bool = False
 
     def __len__(self) -> int:
         return len(self.origin)
@@ -71,15 +113,39 @@ class PlaneCharts:
         """Unit normals, shape (B, 3)."""
         return self.axes[..., 2]
 
+    @property
+    def goals(self) -> Floats:
+        """Chart coordinates of the goals, shape (B, 3), mm."""
+        goal = self.origin if self.goal is None else self.goal
+        return self.coordinates(goal[:, None])[:, 0]
+
+    @property
+    def lengths(self) -> Floats:
+        """Distances from start to goal, mm, shape (B,); 0 for closed strokes."""
+        return np.zeros(len(self)) if self.closed else self.goals[:, 0]
+
+    @property
+    def status(self) -> Integers:
+        """`Status` of each pair, shape (B,)."""
+        met = ~self.closed & (self.lengths <= 0.0)
+        return np.where(met, Status.COINCIDENT, Status.DRAWN)
+
     def coordinates(self, position: Floats) -> Floats:
         """Chart coordinates (B, T, 3) of positions (B, T, 3), mm."""
         coordinates: Floats = (position - self.origin[:, None]) @ self.axes
         return coordinates
 
-    def lift(self, coordinates: Floats) -> Floats:
-        """Positions (B, T, 3) of chart coordinates (B, T, 3), mm."""
-        position: Floats = self.origin[:, None] + coordinates @ np.swapaxes(self.axes, -1, -2)
-        return position
+    def lift(self, coordinates: Floats) -> Lift:
+        """Carry chart coordinates (B, T, 3), mm, to the plane: one rigid transform per pair."""
+        position = self.origin[:, None] + coordinates @ np.swapaxes(self.axes, -1, -2)
+        samples = coordinates.shape[:2]
+        return Lift(
+            position,
+            np.broadcast_to(self.axes[:, None], (*samples, 3, 3)),
+            np.zeros(samples, dtype=bool),
+            self.status,
+            np.zeros(len(self), dtype=bool),
+        )
 
 
 def extent(position: Floats) -> float:
@@ -177,7 +243,7 @@ def pair_charts(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Pl
     ----------
     start, goal : array, shape (B, 3)
         mm.
-    normal : array, shape (3,)
+    normal : array, shape (3,) or, for open strokes, (B, 3)
         Unit normal of the plane to draw on, or of the demonstration's: then each pair has its own
         plane, the one through its line that is closest to parallel to it.
     closed : bool
@@ -189,10 +255,11 @@ def pair_charts(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Pl
         Undefined for an open stroke whose line is the normal's; the caller refuses such pairs.
     """
     if closed:
-        return PlaneCharts(start, np.broadcast_to(closed_axes(normal), (len(start), 3, 3)))
+        axes = np.broadcast_to(closed_axes(normal), (len(start), 3, 3))
+        return PlaneCharts(start, axes, goal, closed=True)
     e_u = goal - start
     e_u = e_u / np.linalg.norm(e_u, axis=-1, keepdims=True)
-    return PlaneCharts(start, open_axes(e_u, normal))
+    return PlaneCharts(start, open_axes(e_u, normal), goal)
 
 
 def _across(direction: Floats, tool_axis: Floats | None) -> Floats:

@@ -92,7 +92,7 @@ def plane(tmp_path, z, normal=(0, 0, 1)):
 def test_start_and_goal_are_moved_onto_a_given_plane_and_that_is_said(learned, tmp_path):
     done = run(learned, "-o", tmp_path / "t", *PAIR, "--surface", plane(tmp_path, -17.0))
     assert done.exit_code == 0
-    assert "start moved 0.538 mm and goal 0.518 mm onto the plane" in done.stderr
+    assert "start moved 0.538 mm and goal 0.518 mm onto the surface" in done.stderr
     np.testing.assert_allclose(read(tmp_path / "t").position()[:, 2], -17.0, atol=1e-9)
 
 
@@ -107,7 +107,7 @@ def test_a_plane_seen_from_below_is_flipped_and_that_is_said(learned, tmp_path):
 def test_a_pair_off_the_plane_is_refused_by_distance(learned, tmp_path):
     done = run(learned, "-o", tmp_path / "t", *PAIR, "--surface", plane(tmp_path, -10.0))
     assert done.exit_code == 2
-    assert "7.538 mm off the plane, more than --snap-tol 1" in done.stderr
+    assert "7.538 mm off the surface, more than --snap-tol 1" in done.stderr
     assert not (tmp_path / "t").exists()
 
 

@@ -13,14 +13,20 @@ from dmpcli.cli import app
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from tests.figures.example_files import (
+    CURVED_GOAL,
+    CURVED_START,
     GOAL,
     NEW_GOAL,
     NEW_START,
     START,
     circle,
+    curved_trajectory,
     demonstration,
+    fillet_mesh,
+    fillet_wave,
     paper_files,
     put,
+    put_stl,
     trajectory,
     wave,
 )
@@ -215,6 +221,68 @@ def test_a_given_plane_decides_what_across_means(tmp_path, files):
     (entry,) = document(files["modified"], "--surface", plane)["files"]
     # Across a plane at 45° to the wave's own the wave looks 1/√2 as high.
     assert entry["strokes"][0]["wave"]["mean"] == pytest.approx(49.2 / np.sqrt(2), abs=0.2)
+
+
+@pytest.fixture
+def curved(tmp_path, files):
+    flat = wave(CURVED_START, CURVED_GOAL, 45.0)
+    original = curved_trajectory(flat, model="original", forcing_scale="distance")
+    return {
+        "demo": files["demo"],
+        "along": put(tmp_path, "along", curved_trajectory(*fillet_wave(49.979))),
+        "through": put(tmp_path, "through", original),
+        "mesh": put_stl(tmp_path, "fillet", *fillet_mesh()),
+    }
+
+
+def test_on_a_mesh_modified_and_original_stand_side_by_side(tmp_path, curved):
+    *strokes, mesh = curved.values()
+    report = document(*strokes, "--surface", mesh)
+    assert report["surface"]["file"] == "fillet.stl"
+    taught, along, through = (entry["strokes"][0]["surface"] for entry in report["files"])
+    assert taught is None
+    assert along["wave_height"] == pytest.approx(49.979, abs=0.02)
+    assert along["distance_max"] < 0.0065
+    assert through["distance_max"] > 5.0
+    text = dmpcli(*strokes, "--surface", mesh, "-q").stdout
+    assert max(map(len, text.splitlines())) <= 80
+    assert "On the surface (fillet.stl)" in text
+    assert re.search(r"^along +49\.9[78]\d +0\.000 +0\.00", text, re.MULTILINE)
+    out = tmp_path / "out"
+    assert dmpcli(*strokes, "--surface", mesh, "-o", out, "-q").exit_code == 0
+    assert (out / "fig9_surface.svg").exists()
+    rows = list(csv.DictReader((out / "wave_heights.csv").read_text().splitlines()))
+    assert [row["stroke"] for row in rows] == ["demo", "along", "through"]
+
+
+def test_a_surface_in_its_own_frame_and_unit_is_placed(tmp_path, curved):
+    V, F = fillet_mesh()
+    # Turned by 90° about z, moved, in metres: the pose says how to get back.
+    local = np.column_stack([V[:, 1], -V[:, 0], V[:, 2]]) - [10.0, 20.0, 30.0]
+    mesh = put_stl(tmp_path, "local", local / 1000.0, F)
+    quarter = np.pi / 2
+    pose = f"-20 10 30 0 0 {quarter}"
+    options = ("--surface", mesh, "--surface-unit", "m", "--surface-pose", pose)
+    (entry,) = document(curved["along"], *options)["files"]
+    assert entry["strokes"][0]["surface"]["distance_max"] < 0.0066
+    assert entry["strokes"][0]["surface"]["wave_height"] == pytest.approx(49.979, abs=0.02)
+
+
+def test_a_batch_on_a_surface_has_statistics_of_it(tmp_path):
+    folder = batch(tmp_path / "many", 24)
+    plane = tmp_path / "plane.json"
+    z = NEW_START[2] - 1.0
+    plane.write_text(
+        json.dumps({"schema": "plane", "version": 1, "point": [0, 0, z], "normal": [0, 0, 1]})
+    )
+    (entry,) = document(folder, "--surface", plane)["files"]
+    assert entry["statistics"]["surface_distance_max"]["median"] == pytest.approx(1.02, abs=0.01)
+    assert "off the surface, mm" in dmpcli(folder, "--surface", plane).stdout
+
+
+def test_a_surfaces_place_needs_a_surface(files):
+    assert "--surface" in refused(files["modified"], "--surface-unit", "m")
+    assert "--surface" in refused(files["modified"], "--surface-pose", "0 0 0 0 0 0")
 
 
 def test_bad_input_is_one_clear_error(tmp_path, files):

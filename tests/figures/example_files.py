@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dmpcli import rotations
 from dmpcli.measures.paper import GENERALIZATION, REPRODUCTION
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record, encode
@@ -92,3 +93,71 @@ def put(folder, name, record):
     path = folder / f"{name}.parquet"
     path.write_bytes(encode(record))
     return str(path)
+
+
+TOP, TANGENT, RADIUS = -17.54, 5.106, 86.774
+"""The bench's rounded side: z of the top, y where it begins, radius, mm."""
+CURVED_START = np.array([-551.698, -37.580, -28.765])
+CURVED_GOAL = np.array([-657.597, -43.254, -32.265])
+
+
+def on_fillet(flat):
+    """Points (x, length of arc) carried to the rounded side: positions and normals."""
+    a = flat[:, 1] / RADIUS
+    normal = np.column_stack([0 * a, -np.sin(a), np.cos(a)])
+    return normal * RADIUS + np.column_stack([flat[:, 0], 0 * a + TANGENT, 0 * a + TOP - RADIUS]), (
+        normal
+    )
+
+
+def off_fillet(point):
+    """Points of the rounded side unrolled: x and length of arc."""
+    arc = RADIUS * np.arctan2(TANGENT - point[..., 1], point[..., 2] - TOP + RADIUS)
+    return np.stack([point[..., 0], arc], axis=-1)
+
+
+def fillet_wave(height=50.0, n=501):
+    """Sine wave along the rounded side at the paper's curved pair: positions and normals."""
+    start, goal = off_fillet(CURVED_START), off_fillet(CURVED_GOAL)
+    s = np.linspace(0.0, 1.0, n)
+    u = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    way = goal - start
+    across = np.array([way[1], -way[0]]) / np.linalg.norm(way)
+    return on_fillet(start + u * way + 0.5 * height * np.sin(2 * np.pi * u) * across)
+
+
+def fillet_mesh(step=2.0):
+    """Mesh of the rounded side and some of the top: V, F; its corners lie on the surface."""
+    x = np.arange(-680.0, -529.0, 10.0)
+    arc = np.concatenate([np.arange(-80.0, 0.0, 10.0), np.arange(0.0, 130.0, step)])
+    grid = np.stack(np.meshgrid(x, arc, indexing="ij"), axis=-1).reshape(-1, 2)
+    V = on_fillet(grid)[0]
+    flat = grid[:, 1] < 0.0
+    V[flat] = np.column_stack([grid[flat, 0], TANGENT - grid[flat, 1], np.full(flat.sum(), TOP)])
+    i = np.arange(len(V)).reshape(len(x), len(arc))
+    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    return V, np.concatenate([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
+
+
+def put_stl(folder, name, V, F):
+    """Write a binary STL; return its path."""
+    facet = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    facets = np.zeros(len(F), dtype=facet)
+    facets["v"] = V[F]
+    path = folder / f"{name}.stl"
+    path.write_bytes(b" " * 80 + np.uint32(len(F)).tobytes() + facets.tobytes())
+    return str(path)
+
+
+def curved_trajectory(path, normals=None, rotation=None, dt=0.02, **facts):
+    """Trajectory on a curved surface: a normal per row, none in the facts."""
+    columns = {"id": np.array(["1"] * len(path), dtype=object), "t": np.arange(len(path)) * dt}
+    columns |= dict(zip(POSITION, path.T, strict=True))
+    if rotation is not None:
+        angles = rotations.to_euler_continuous(rotation)
+        columns |= dict(zip(schemas.EULER_ANGLES, angles.T, strict=True))
+    if normals is not None:
+        columns |= dict(zip(schemas.NORMAL, normals.T, strict=True))
+    known = {"model": "modified", "forcing_scale": None}
+    known |= {"start": CURVED_START.tolist(), "goal": CURVED_GOAL.tolist()} | facts
+    return Record(schemas.TRAJECTORY, columns, Provenance("generalize", {}, (), known))

@@ -1,5 +1,7 @@
 """Carrying a skill to new pairs: invariances, ends, heights, orientations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -32,17 +34,16 @@ def ring():
     return fit([circle()], Choices(regression="ridge")).skill
 
 
-def draw_one(skill, start, goal, normal=None, duration=None, pairs=None, **style):
+def draw_one(skill, start, goal, surface=None, duration=None, pairs=None, **style):
     pairs = pairs or Pairs(np.array([start], dtype=float), np.array([goal], dtype=float))
-    normal = skill.frame.normal if normal is None else normal
     duration = np.full(len(pairs), duration or skill.duration)
-    return draw(skill, pairs, duration, normal, Style(**style))[0]
+    return draw(skill, pairs, duration, surface, Style(**style))[0]
 
 
 def wave(stroke, start, goal):
     """Peak to trough across the start-goal line, by the stroke's own normal."""
     u = (goal - start) / np.linalg.norm(goal - start)
-    return np.ptp((stroke.position - start) @ np.cross(stroke.normal, u))
+    return np.ptp((stroke.position - start) @ np.cross(stroke.normal[0], u))
 
 
 def test_the_demonstrated_pair_gives_the_demonstration_back(skill):
@@ -115,18 +116,19 @@ shift = st.tuples(*[st.floats(-500.0, 500.0)] * 3).map(np.array)
 @given(angles, shift)
 def test_a_rigid_motion_of_pair_and_plane_moves_the_stroke_by_the_same_motion(skill, turn, by):
     Q = rotations.exp(turn)
-    here = draw_one(skill, NEW_START, NEW_GOAL, orientation="surface")
-    there = draw_one(
-        skill,
-        Q @ NEW_START + by,
-        Q @ NEW_GOAL + by,
-        normal=Q @ skill.frame.normal,
-        orientation="surface",
-    )
+    n = skill.frame.normal
+    plate = Plane(NEW_START, n)
+    here = draw_one(skill, NEW_START, NEW_GOAL, plate, orientation="surface")
+    moved = Plane(Q @ NEW_START + by, Q @ n)
+    start, goal = Q @ NEW_START + by, Q @ NEW_GOAL + by
+    pairs = Pairs(start[None], goal[None])
+    turned = replace(skill, frame=replace(skill.frame, rotation=Q @ skill.frame.rotation))
+    turned = replace(turned, frame=replace(turned.frame, axes=Q @ skill.frame.axes))
+    there = draw(turned, pairs, np.array([10.0]), moved, Style(orientation="surface"))[0]
     np.testing.assert_allclose(there.position, here.position @ Q.T + by, atol=1e-8)
-    moved = Q @ rotations.from_euler(here.euler)
-    np.testing.assert_allclose(rotations.from_euler(there.euler), moved, atol=1e-9)
-    np.testing.assert_allclose(there.normal, Q @ here.normal, atol=1e-9)
+    expected = Q @ rotations.from_euler(here.euler)
+    np.testing.assert_allclose(rotations.from_euler(there.euler), expected, atol=1e-9)
+    np.testing.assert_allclose(there.normal, here.normal @ Q.T, atol=1e-9)
 
 
 def test_keep_turns_the_tool_as_demonstrated_wherever_the_pair_lies(skill):
@@ -156,7 +158,7 @@ def test_pairs_drawn_together_equal_pairs_drawn_alone(skill):
     rng = np.random.default_rng(8)
     start, goal = rng.normal(size=(2, 7, 3)) * 200
     duration = rng.choice([5.0, 10.0, 7.3], size=7)
-    together = draw(skill, Pairs(start, goal), duration, skill.frame.normal, Style())
+    together = draw(skill, Pairs(start, goal), duration, None, Style())
     for i, stroke in enumerate(together):
         alone = draw_one(skill, start[i], goal[i], duration=duration[i])
         np.testing.assert_allclose(stroke.position, alone.position, atol=1e-9)

@@ -17,7 +17,7 @@ UP = np.array([0.0, 0.0, 1.0])
 def draw_at(skill, start, goal, duration=None):
     pairs = Pairs(np.array([start], dtype=float), np.array([goal], dtype=float))
     seconds = np.array([duration or skill.duration])
-    return draw(skill, pairs, seconds, skill.frame.normal, Style(rate=100.0))[0]
+    return draw(skill, pairs, seconds, None, Style(rate=100.0))[0]
 
 
 @pytest.mark.parametrize("shape", shapes())
@@ -51,7 +51,7 @@ def test_new_pairs_keep_the_shape(shape):
             drawn = draw_at(skill, [0, 0, 0], goal, duration=2.5)
             assert np.all(np.isfinite(drawn.position))
             assert np.linalg.norm(drawn.position[-1] - goal) < 0.02 * size
-            across = drawn.position @ np.cross(drawn.normal, [0.6, 0.8, 0.0])
+            across = drawn.position @ np.cross(drawn.normal[0], [0.6, 0.8, 0.0])
             line = (here.position - skill.frame.start) @ skill.frame.axes[:, 1]
             if not skill.closed:
                 assert np.ptp(across) == pytest.approx(np.ptp(line), abs=0.02 * size)

@@ -108,7 +108,7 @@ def test_charts_hit_both_ends_and_invert(start, goal, seed):
     np.testing.assert_allclose(ends[0], 0.0, atol=1e-9)
     np.testing.assert_allclose(ends[1], [np.linalg.norm(goal - start), 0, 0], atol=1e-7)
     points = np.random.default_rng(seed).normal(size=(1, 6, 3)) * 50
-    np.testing.assert_allclose(charts.coordinates(charts.lift(points)), points, atol=1e-9)
+    np.testing.assert_allclose(charts.coordinates(charts.lift(points).position), points, atol=1e-9)
 
 
 def test_a_given_plane_is_flipped_to_the_tools_side():

@@ -1,0 +1,191 @@
+"""The pose file: where a part lies in the robot's base frame, as JSON; and six words for one."""
+
+import json
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dmpcli import __version__, rotations
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.records import streams
+from dmpcli.records.schemas import EULER, FRAME
+from dmpcli.records.skill import json_document
+from dmpcli.records.streams import Source
+
+SCHEMA = "pose"
+VERSION = 1
+
+Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+Distance = Annotated[float, Field(ge=0)]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a part's own frame lies in the robot's base frame: x_base = R x_part + position.
+
+    Attributes
+    ----------
+    position : array, shape (3,)
+        mm.
+    rotation : array, shape (3, 3)
+        R.
+    """
+
+    position: Floats
+    rotation: Floats
+
+    @classmethod
+    def of(cls, six: Floats) -> "Pose":
+        """Return the pose of X Y Z (mm) RX RY RZ (X-Y-Z Euler angles, rad)."""
+        return cls(np.array(six[:3], dtype=float), rotations.from_euler(np.array(six[3:])))
+
+    def to_base(self, points: Floats) -> Floats:
+        """Carry points (..., 3) of the part, mm, into the base frame."""
+        moved: Floats = points @ self.rotation.T + self.position
+        return moved
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Residuals(_Part):
+    """Distances that the fit leaves, mm."""
+
+    points: Annotated[int, Field(ge=0)]
+    rms: Distance
+    largest: Distance
+
+
+class Conditioning(_Part):
+    """How well the touched points hold the part, see docs/registration.md."""
+
+    number: Annotated[float, Field(ge=1, description="largest gain over smallest")]
+    gain: Annotated[
+        float, Field(ge=0, description="residual RMS per unit of the least certain motion")
+    ]
+    weakest: Annotated[str, Field(description="the least certain motion, in the base frame")]
+    uncertainty: Annotated[
+        Distance, Field(description="standard deviation of that motion, mm at the touched points")
+    ]
+
+
+class PoseFile(_Part):
+    """Where a part lies in the robot's base frame."""
+
+    schema_name: Annotated[Literal["pose"], Field(alias="schema")] = "pose"
+    version: Annotated[int, Field(ge=1)] = VERSION
+    tool: str = __version__
+    frame_convention: str = FRAME
+    euler_convention: str = EULER
+    position: Annotated[Three, Field(description="the part's origin in base axes, mm")]
+    rotation: Annotated[Three, Field(description=f"Euler angles, {EULER}, rad")]
+    residuals: Residuals | None = None
+    conditioning: Conditioning | None = None
+    options: dict[str, Any] = {}
+    inputs: list[dict[str, str]] = []
+
+
+def encode(
+    pose: Pose,
+    residuals: Residuals | None = None,
+    conditioning: Conditioning | None = None,
+    options: dict[str, Any] | None = None,
+    inputs: list[dict[str, str]] | None = None,
+) -> bytes:
+    """Return a pose as the bytes of its JSON file."""
+    document = PoseFile(
+        position=pose.position.tolist(),
+        rotation=rotations.to_euler(pose.rotation).tolist(),
+        residuals=residuals,
+        conditioning=conditioning,
+        options=options or {},
+        inputs=inputs or [],
+    )
+    plain = document.model_dump(mode="json", by_alias=True)
+    return (json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def decode(source: Source) -> tuple[Pose, PoseFile]:
+    """Read a pose file.
+
+    Raises
+    ------
+    InputError
+        Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
+    """
+    document = json_document(source)
+    if document.get("schema", SCHEMA) != SCHEMA:
+        raise InputError(
+            f"{source.name}: has schema {document.get('schema')!r}, a pose file is needed"
+        )
+    version = document.get("version", VERSION)
+    if isinstance(version, int) and version > VERSION:
+        raise InputError(
+            f"{source.name}: pose version {version} is newer than this program's ({VERSION}); "
+            "upgrade dmpcli"
+        )
+    try:
+        file = PoseFile.model_validate(document)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"]) or "document"
+        raise InputError(
+            f"{source.name}: {where}: {detail['msg']}; a pose is "
+            '{"position": [x, y, z], "rotation": [rx, ry, rz]} in mm and rad'
+        ) from None
+    return Pose.of(np.array([*file.position, *file.rotation])), file
+
+
+def parse(value: str, option: str) -> tuple[Pose, Source | None]:
+    """Read a pose from an option's value.
+
+    Parameters
+    ----------
+    value : str
+        ``X Y Z RX RY RZ`` in mm and rad, or the path of a pose file; - is standard input.
+    option : str
+        What messages call it.
+
+    Returns
+    -------
+    pose : Pose
+    source : Source or None
+        Of the pose file, where it came from one.
+
+    Raises
+    ------
+    InputError
+        Neither six finite numbers nor a pose file.
+    """
+    words = value.split()
+    numbers = [_number(word) for word in words]
+    if not words or numbers[0] is None:
+        source = streams.read(value)
+        return decode(source)[0], source
+    if len(words) != 6 or None in numbers:
+        raise InputError(
+            f"{option} {value}: a pose is six numbers, X Y Z in mm and RX RY RZ in rad, or a file"
+        )
+    six = np.array(numbers, dtype=float)
+    if not np.isfinite(six).all():
+        raise InputError(f"{option} {value}: a pose needs finite numbers")
+    return Pose.of(six), None
+
+
+def _number(word: str) -> float | None:
+    try:
+        return float(word)
+    except ValueError:
+        return None
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of pose files."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "dmpcli pose",
+    } | PoseFile.model_json_schema(by_alias=True)

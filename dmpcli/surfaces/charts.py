@@ -1,0 +1,233 @@
+"""Charts of a mesh: which geodesic each pair gets, and which way its strokes are carried."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces import shooting, strip, unfolding
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.nodes import Centre
+from dmpcli.surfaces.protocol import Lift, Status, Walks, first_refusal, towards
+from dmpcli.surfaces.shooting import Aim
+from dmpcli.surfaces.vectors import across, cross, dot, length
+from dmpcli.surfaces.walked import closed_direction, goal_coordinates, walk_samples
+
+# Start and goal nearer to each other than this have no direction, mm.
+COINCIDENT = 1e-6
+# A stroke that is walked over a crease is followed this much at a time to see whether it folds, mm.
+_LEAST_MOVE = 1e-3
+_FLAT = np.cos(np.radians(10.0))
+
+
+@dataclass(frozen=True)
+class MeshCharts:
+    """Charts of start-goal pairs on a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    centre : Centre
+        B centre lines.
+    target : array, shape (B, 3)
+        Goals on the mesh, mm.
+    lengths : array, shape (B,)
+        mm; 0 for closed strokes.
+    goals : array, shape (B, 3)
+        Chart coordinates, mm.
+    status : array of int, shape (B,)
+    creased : array of bool, shape (B,)
+        Pairs whose geodesic crosses a crease and was found by unfolding.
+    """
+
+    mesh: Mesh
+    centre: Centre
+    target: Floats
+    lengths: Floats
+    goals: Floats
+    status: Integers
+    creased: Booleans
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def lift(self, coordinates: Floats) -> Lift:
+        """Carry chart coordinates (B, T, 3), mm, to the mesh; see `Lift`."""
+        shape = coordinates.shape
+        foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
+        axes = np.broadcast_to(np.eye(3), (*shape[:2], 3, 3)).copy()
+        outside, status = np.ones(shape[:2], dtype=bool), self.status.copy()
+        unfolded = self.creased & (status == Status.DRAWN)
+        smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
+        if len(smooth):
+            u, v = coordinates[smooth, :, 0], coordinates[smooth, :, 1]
+            part = strip.lift(self.mesh, self.centre.rows(smooth), u, v)
+            foot[smooth] = part.foot
+            e_u = cross(part.across, part.normal)
+            axes[smooth] = np.stack([e_u, part.across, part.normal], axis=-1)
+            outside[smooth] = part.outside
+            status[smooth] = np.where(part.sharp, Status.DRAWN, part.status)
+            unfolded[smooth[part.sharp]] = True
+        creased = np.flatnonzero(unfolded)
+        if len(creased):
+            foot[creased], axes[creased], outside[creased], status[creased] = self._unfold(
+                creased, coordinates[creased]
+            )
+        position = foot + coordinates[..., 2:] * axes[..., 2]
+        return Lift(position, axes, outside, status, unfolded)
+
+    def _unfold(
+        self, rows: Integers, coordinates: Floats
+    ) -> tuple[Floats, Floats, Booleans, Integers]:
+        """Feet (R, T, 3), axes, points outside and status of pairs that are walked by facets."""
+        centre = self.centre.rows(rows)
+        direction, scale = centre.direction, np.ones(len(rows))
+        status = np.full(len(rows), Status.DRAWN, dtype=np.int64)
+        # A centre line that was stepped along is not quite the facets' own: shoot once more.
+        again = np.flatnonzero(~self.creased[rows] & (self.lengths[rows] > 0.0))
+        if len(again):
+            aim = _aim(centre.rows(again), self.target[rows[again]])
+            aim.direction, aim.length = direction[again], self.lengths[rows[again], None]
+            aim, _, good = shooting.hit(self.mesh, aim, shooting.by_facets)
+            direction = direction.copy()
+            direction[again] = aim.direction
+            scale[again] = aim.length[:, 0] / self.lengths[rows[again]]
+            status[again] = np.where(good, Status.DRAWN, Status.NO_GEODESIC)
+        scaled = coordinates * np.array([1.0, 1.0, 0.0])
+        scaled[..., 0] *= scale[:, None]
+
+        def walk(origin: Floats, heading: Floats, way: Floats) -> Walks:
+            return unfolding.walk(self.mesh, origin, heading, way)
+
+        foot, axes, arrived = walk_samples(walk, centre.origin, direction, centre.sign, scaled)
+        left = np.where(arrived.all(axis=1), Status.DRAWN, Status.BORDER)
+        folds = np.where(_folded(foot, axes, scaled), Status.FOLDED, Status.DRAWN)
+        return foot, axes, ~arrived, first_refusal(status, left, folds)
+
+
+def _folded(foot: Floats, axes: Floats, coordinates: Floats) -> Booleans:
+    """Tell which strokes (R, T, 3) move backwards along e_u while u goes on, shape (R,)."""
+    move, change = np.diff(foot, axis=1), np.diff(coordinates, axis=1)
+    along = 0.5 * (dot(move, axes[:, :-1, :, 0])[..., 0] + dot(move, axes[:, 1:, :, 0])[..., 0])
+    du, dv = change[..., 0], change[..., 1]
+    clear = (np.abs(du) > _LEAST_MOVE) & (np.abs(du) > 0.2 * np.abs(dv))
+    # The chord over a crease is in neither facet.
+    clear &= dot(axes[:, :-1, :, 2], axes[:, 1:, :, 2])[..., 0] > _FLAT
+    return np.asarray(np.any(clear & (along * du < 0.0), axis=1))
+
+
+def mesh_charts(
+    mesh: Mesh, start: Floats, goal: Floats, side: Floats | None, closed: Floats | None
+) -> MeshCharts:
+    """Charts of a mesh; see `Surface.charts`."""
+    a, b = mesh.closest(start), mesh.closest(goal)
+    part = mesh.components[a.face]
+    apart = np.where(part != mesh.components[b.face], Status.OTHER_COMPONENT, Status.DRAWN)
+    # A solid is drawn on from outside: if the tool would stand in it, a thin wall's far side was
+    # nearest. An open sheet may be wound either way.
+    outward = mesh.outward[part][:, None]
+    sign = np.where(outward == 0.0, towards(a.normal, side), outward)
+    if side is not None:
+        inside = (outward != 0.0) & (dot(sign * a.normal, np.asarray(side, dtype=float)) < 0.0)
+        apart = first_refusal(apart, np.where(inside[:, 0], Status.OTHER_SIDE, Status.DRAWN))
+    count = len(part)
+    normal = sign * a.normal
+    centre = Centre(a.position, normal, normal, np.ones((count, 1)), sign, part)
+    if closed is not None:
+        direction = closed_direction(closed, normal)
+        step = np.full((count, 1), shooting.STEP)
+        centre = Centre(a.position, normal, direction, step, sign, part)
+        zeros = np.zeros((count, 3))
+        creased = np.zeros(count, dtype=bool)
+        charts = MeshCharts(mesh, centre, b.position, zeros[:, 0], zeros, apart, creased)
+        goals = goal_coordinates(charts.lift, b.position)
+        return MeshCharts(mesh, centre, b.position, zeros[:, 0], goals, apart, creased)
+    link = connect(mesh, centre, b.position, apart)
+    turned = dot(sign * b.normal, link.normal)[:, 0] < 0.0
+    turned &= link.status == Status.DRAWN
+    centre = Centre(a.position, normal, link.direction, link.step, sign, part)
+    goals = np.stack([link.length, 0.0 * link.length, 0.0 * link.length], axis=-1)
+    status = np.where(turned, Status.OTHER_SIDE, link.status)
+    return MeshCharts(mesh, centre, b.position, link.length, goals, status, link.creased)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Geodesics found: e_u at the start, normal at the goal, step of the nodes, length, mm."""
+
+    direction: Floats
+    normal: Floats
+    step: Floats
+    length: Floats
+    status: Integers
+    creased: Booleans
+
+
+def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
+    """Find the geodesics from the charts' starts to points (B, 3) of the mesh.
+
+    Stepped along the smooth normal; unfolded where that meets a crease or does not arrive. Pairs
+    of another status than DRAWN keep it.
+    """
+    count = len(status)
+    met = length(goal - centre.origin)[:, 0] < COINCIDENT
+    status = first_refusal(status, np.where(met, Status.COINCIDENT, Status.DRAWN))
+    direction, normal = centre.normal.copy(), centre.normal.copy()
+    lengths, step = np.zeros(count), np.ones((count, 1))
+    creased = np.zeros(count, dtype=bool)
+    rows = np.flatnonzero(status == Status.DRAWN)
+    if len(rows) == 0:
+        return Link(direction, normal, step, lengths, status, creased)
+    first = _aim(centre.rows(rows), goal[rows])
+    aim, ends, good = shooting.hit(mesh, first, shooting.by_steps)
+    creases = np.flatnonzero(ends.sharp | ~good)
+    if len(creases):
+        again, there, good[creases] = shooting.hit(mesh, first.rows(creases), shooting.by_facets)
+        aim.direction[creases], aim.length[creases] = again.direction, again.length
+        ends.fill(creases, there, np.ones(len(creases), dtype=bool))
+    creased[rows[creases]] = True
+    direction[rows], normal[rows] = aim.direction, ends.normal
+    lengths[rows], step[rows] = aim.length[:, 0], aim.length / aim.steps[:, None]
+    status[rows] = np.where(good, Status.DRAWN, Status.NO_GEODESIC)
+    return Link(direction, normal, step, lengths, status, creased)
+
+
+def walk(mesh: Mesh, origin: Floats, direction: Floats, way: Floats) -> Walks:
+    """Walk geodesics; see `Surface.walk`. Stepped, and unfolded at creases and borders."""
+    shape = np.shape(origin)
+    hits = mesh.closest(np.asarray(origin, dtype=float).reshape(-1, 3))
+    size = np.broadcast_to(way, shape[:-1]).reshape(-1)
+    backward = np.where(size < 0.0, -1.0, 1.0)[:, None]
+    heading = across(np.broadcast_to(direction, shape).reshape(-1, 3), hits.normal) * backward
+    ones = np.ones((len(size), 1))
+    aim = Aim(
+        hits.position,
+        hits.normal,
+        hits.position,
+        heading,
+        np.abs(size)[:, None],
+        np.maximum(1, np.ceil(np.abs(size) / shooting.STEP)).astype(np.int64),
+        ones,
+        mesh.components[hits.face],
+    )
+    # A walk of no length still needs a step to look around with.
+    aim.length = np.maximum(aim.length, 1e-9)
+    ends = shooting.by_steps(mesh, aim)
+    there = mesh.closest(ends.position)
+    position, normal = there.position, there.normal
+    ahead, arrived = across(ends.direction, normal), ~ends.off
+    rows = np.flatnonzero(ends.sharp | ends.off)
+    if len(rows):
+        end = unfolding.walk(mesh, hits.position[rows], heading[rows], np.abs(size)[rows])
+        position[rows], ahead[rows], normal[rows] = end.position, end.direction, end.normal
+        arrived[rows] = end.arrived
+    return Walks(
+        position.reshape(shape),
+        (ahead * backward).reshape(shape),
+        normal.reshape(shape),
+        arrived.reshape(shape[:-1]),
+    )
+
+
+def _aim(centre: Centre, goal: Floats) -> Aim:
+    return shooting.take_aim(centre.origin, centre.normal, goal, centre.sign, centre.part)

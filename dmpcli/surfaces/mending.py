@@ -1,0 +1,354 @@
+"""Triangles as people have them, made into a surface: oriented, edge and vertex manifold.
+
+What is safe is mended and said: it moves no face by more than `MERGE` of the mesh's size. The rest
+is refused by name. What libigl would crash on is looked for before libigl sees anything.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import igl
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.errors import InputError
+
+MERGE = 1e-6
+"""Points nearer than this part of the largest coordinate are one: some roundings of a float32."""
+
+_AT_ONCE = 1_000_000
+"""Pairs of border edge and near vertex that are looked at together."""
+
+LARGEST = 1e7
+"""mm. A part that reaches further has its unit misstated."""
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A mesh that libigl and the charts can work on.
+
+    Attributes
+    ----------
+    V : array, shape (n, 3)
+        Vertices, all referenced, no two at one point unless they belong to sheets that only touch.
+    F : array, shape (m, 3)
+        Faces with area, none twice, every edge between two at most, wound consistently within each
+        component.
+    remarks : list of str
+        What was mended.
+    """
+
+    V: Floats
+    F: Integers
+    remarks: list[str] = field(default_factory=list)
+
+
+def mended(V: Floats, F: Integers) -> Mended:
+    """Check and mend a triangle mesh.
+
+    Parameters
+    ----------
+    V : array, shape (n, 3)
+        Vertices, mm.
+    F : array, shape (m, 3)
+        Indices into V, any integers.
+
+    Returns
+    -------
+    Mended
+
+    Raises
+    ------
+    InputError
+        No faces, an index out of range, a coordinate that is not finite or too large, an edge of
+        three faces or more, or a one-sided component; says which and where.
+    """
+    draft, remark = _checked(V, F)
+    remarks = [remark]
+    tolerance = MERGE * float(np.abs(draft.V).max())
+    steps = (_merged, _welded, _without_thin_faces, _without_twins, _stitched, _oriented, _parted)
+    for step in steps:
+        draft, remark = step(draft, tolerance)
+        remarks.append(remark)
+        if len(draft.F) == 0:
+            raise InputError("no face has any area; export the part again")
+    draft, _ = _referenced(draft)
+    return Mended(draft.V, draft.F, [remark for remark in remarks if remark])
+
+
+def components(F: Integers) -> int:
+    """Return the number of pieces of a mended mesh: no two of them share a vertex."""
+    pairs = np.concatenate([F[:, :2], F[:, 1:]])
+    return _groups(int(F.max()) + 1, pairs)[0]
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """The edges of faces (m, 3).
+
+    Attributes
+    ----------
+    half : array, shape (3m, 2)
+        Directed edges; number h stands opposite corner h // m of face h % m.
+    crowded : array
+        Half edges of edges of three faces or more, those of one edge side by side.
+    border : array
+        Half edges of edges of a single face.
+    one, other : array, shape (i,)
+        The two half edges of edges between two faces.
+    """
+
+    half: Integers
+    crowded: Integers
+    border: Integers
+    one: Integers
+    other: Integers
+
+    @property
+    def at_odds(self) -> Booleans:
+        """Which edges between two faces these run along in one direction, shape (i,)."""
+        odd: Booleans = self.half[self.one, 0] == self.half[self.other, 0]
+        return odd
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """Vertices and faces between two steps."""
+
+    V: Floats
+    F: Integers
+
+    @cached_property
+    def edges(self) -> _Edges:
+        half, _, _, start, halves = igl.unique_edge_map(self.F)
+        count, start = np.diff(start), start[:-1]
+        crowded = halves[np.repeat(count > 2, count)]
+        inner = start[count == 2]
+        return _Edges(half, crowded, halves[start[count == 1]], halves[inner], halves[inner + 1])
+
+
+def _count(number: int, thing: str, several: str = "") -> str:
+    return f"{number} {thing if number == 1 else several or thing + 's'}"
+
+
+def _checked(V: Floats, F: Integers) -> tuple[_Draft, str]:
+    if len(F) == 0:
+        raise InputError("holds no faces; a surface needs triangles")
+    if F.min() < 0 or F.max() >= len(V):
+        wrong = (F < 0) | (len(V) <= F)
+        face = int(np.argmax(wrong.any(axis=1)))
+        raise InputError(
+            f"face {face + 1} names vertex {F[face][wrong[face]][0] + 1}, but there are {len(V)}; "
+            "export the part again"
+        )
+    draft, remark = _referenced(_Draft(V, F))
+    largest = float(max(draft.V.max(), -draft.V.min()))  # NaN where there is one
+    if not np.isfinite(largest):
+        bad: Booleans = np.asarray(~np.isfinite(draft.V).all(axis=1))
+        face = int(np.argmax(bad[draft.F].any(axis=1)))
+        corners = draft.F[face]
+        x, y, z = draft.V[corners[bad[corners]][0]]
+        raise InputError(
+            f"face {face + 1} has a vertex at ({x:g}, {y:g}, {z:g}), which is no place "
+            f"({_count(int(bad.sum()), 'such vertex', 'such vertices')}); export the part again"
+        )
+    if largest > LARGEST:
+        raise InputError(f"its coordinates reach {largest:.3g} mm; check the unit of length")
+    return draft, remark
+
+
+def _referenced(draft: _Draft) -> tuple[_Draft, str]:
+    used = np.zeros(len(draft.V), dtype=bool)
+    used[draft.F] = True
+    if used.all():
+        return draft, ""
+    number = np.cumsum(used) - 1
+    left = len(used) - int(used.sum())
+    remark = f"{_count(left, 'vertex', 'vertices')} of no face left out"
+    return _Draft(draft.V[used], number[draft.F]), remark
+
+
+def _merged(draft: _Draft, _: float) -> tuple[_Draft, str]:
+    """Make one vertex of those at exactly the same point."""
+    order = np.lexsort(draft.V.T)
+    V = draft.V[order]
+    first = np.ones(len(V), dtype=bool)
+    first[1:] = (V[1:] != V[:-1]).any(axis=1)
+    merged = len(V) - int(first.sum())
+    if merged == 0:
+        return draft, ""
+    soup = np.array_equal(draft.F.ravel(), np.arange(len(V)))  # an STL can be nothing else
+    number = np.empty(len(V), dtype=np.int64)
+    number[order] = np.cumsum(first) - 1
+    remark = f"{_count(merged, 'duplicate vertex', 'duplicate vertices')} merged"
+    return _Draft(V[first], number[draft.F]), "" if soup else remark
+
+
+def _welded(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
+    """Close cracks: make one of border vertices, or ends of an edge, within the tolerance."""
+    V, edges = draft.V, draft.edges
+    border = np.unique(edges.half[edges.border])
+    pairs = border[cKDTree(V[border]).query_pairs(tolerance, output_type="ndarray")]
+    # Edge k of igl's lengths stands opposite corner k, as half edges do.
+    ends_apart = edges.half[:, 0] != edges.half[:, 1]
+    short = edges.half[(igl.edge_lengths(V, draft.F).T.ravel() <= tolerance) & ends_apart]
+    joined = np.concatenate([pairs, short])
+    if len(joined) == 0:
+        return draft, ""
+    _, group = _groups(len(V), joined)
+    _, first, number = np.unique(group, return_index=True, return_inverse=True)
+    gone = _count(len(V) - len(first), "vertex", "vertices")
+    remark = f"{gone} merged that lay within {tolerance:.2g} mm of another"
+    return _Draft(V[first], number[draft.F]), remark
+
+
+def _groups(n: int, pairs: Integers) -> tuple[int, Integers]:
+    """Return how many groups pairs (k, 2) of n things make, and the group of each thing (n,)."""
+    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(n, n))
+    number, group = connected_components(graph, directed=False)
+    return int(number), np.asarray(group, dtype=np.int64)
+
+
+def _without_thin_faces(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
+    """Leave out faces whose corners lie on a line; `_stitched` closes what they leave."""
+    F = draft.F
+    thin = igl.doublearea(draft.V, F) <= tolerance * igl.edge_lengths(draft.V, F).max(axis=1)
+    for k in range(3):
+        thin |= F[:, k] == F[:, k - 1]
+    gone = int(thin.sum())
+    if gone == 0:
+        return draft, ""
+    return _Draft(draft.V, F[~thin]), f"{_count(gone, 'face')} without area left out"
+
+
+def _without_twins(draft: _Draft, _: float) -> tuple[_Draft, str]:
+    """Leave out faces of the same three corners as an earlier one, whatever their winding."""
+    F, edges = draft.F, draft.edges
+    m = len(F)
+    apex = F.T.ravel()
+    one, other = edges.one, edges.other
+    alike = apex[one] == apex[other]
+    suspects = np.concatenate([one[alike] % m, other[alike] % m, edges.crowded % m])
+    if len(suspects) == 0:
+        return draft, ""
+    suspects = np.unique(suspects)
+    corners = np.sort(F[suspects], axis=1)
+    first = np.unique(corners, axis=0, return_index=True)[1]
+    twin = np.zeros(m, dtype=bool)
+    twin[suspects] = True
+    twin[suspects[first]] = False
+    gone = int(twin.sum())
+    if gone == 0:
+        return draft, ""
+    return _Draft(draft.V, draft.F[~twin]), f"{_count(gone, 'duplicate face')} left out"
+
+
+def _stitched(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
+    """Split border edges at the border vertices that lie on them (T-junctions)."""
+    split = 0
+    while hits := _on_border_edges(draft, tolerance):
+        faces = draft.F.tolist()
+        for face, (a, b, opposite, on) in hits.items():
+            chain = [a, *on, b]
+            pieces = [[p, q, opposite] for p, q in pairwise(chain)]
+            faces[face] = pieces[0]
+            faces += pieces[1:]
+            split += len(on)
+        draft = _Draft(draft.V, np.array(faces, dtype=np.int64))
+    return draft, f"{_count(split, 'T-junction')} stitched" if split else ""
+
+
+def _on_border_edges(draft: _Draft, tolerance: float) -> dict[int, tuple[int, int, int, list[int]]]:
+    """Per face at most one border edge that vertices lie on: (a, b, opposite, vertices a → b)."""
+    V, F, edges = draft.V, draft.F, draft.edges
+    half = edges.border
+    if len(half) == 0:
+        return {}
+    a, b = edges.half[half].T
+    border = np.unique(edges.half[half])
+    tree = cKDTree(V[border])
+    middle, reach = (V[a] + V[b]) / 2.0, np.linalg.norm(V[b] - V[a], axis=1) / 2.0 + tolerance
+    opposite = F[half % len(F), half // len(F)]
+    found: list[tuple[float, int, int]] = []
+    # Long edges have many vertices near: as many edges at a time as memory bears.
+    counts = tree.query_ball_point(middle, reach, return_length=True)
+    for edges_here in np.split(
+        np.arange(len(half)), np.flatnonzero(np.diff(np.cumsum(counts) // _AT_ONCE)) + 1
+    ):
+        near = tree.query_ball_point(middle[edges_here], reach[edges_here])
+        row = np.repeat(edges_here, counts[edges_here])
+        vertex = border[np.concatenate([np.asarray(n, dtype=np.int64) for n in near])]
+        along, before, behind = V[b[row]] - V[a[row]], V[vertex] - V[a[row]], V[b[row]] - V[vertex]
+        square = np.sum(along**2, axis=1)
+        place = np.sum(before * along, axis=1) / square
+        distance = np.linalg.norm(before - place[:, None] * along, axis=1)
+        # Both pieces are shorter than the edge, so that splitting comes to an end.
+        between = np.maximum(np.sum(before**2, axis=1), np.sum(behind**2, axis=1)) < square
+        own = (vertex == a[row]) | (vertex == b[row]) | (vertex == opposite[row])
+        on = (distance <= tolerance) & between & ~own
+        found += zip(place[on].tolist(), row[on].tolist(), vertex[on].tolist(), strict=True)
+    hits: dict[int, tuple[int, int, int, list[int]]] = {}
+    edge_of: dict[int, int] = {}
+    for _, edge, on_it in sorted(found):
+        face = int(half[edge]) % len(F)
+        if edge_of.setdefault(face, edge) == edge:
+            ends = (int(a[edge]), int(b[edge]), int(opposite[edge]))
+            hits.setdefault(face, (*ends, []))[3].append(on_it)
+    return hits
+
+
+def _oriented(draft: _Draft, _: float) -> tuple[_Draft, str]:
+    """Turn faces over so that neighbours agree; each component keeps what most of it had."""
+    crowded = draft.edges.half[draft.edges.crowded]
+    if len(crowded):
+        number = len(np.unique(np.sort(crowded, axis=1), axis=0))
+        x, y, z = draft.V[crowded[0]].mean(axis=0)
+        raise InputError(
+            f"{_count(number, 'edge belongs', 'edges belong')} to three faces or more, "
+            f"the first at ({x:.6g}, {y:.6g}, {z:.6g}) mm, so that the surface forks there; "
+            "remove inner walls, or export the sides one by one"
+        )
+    if not draft.edges.at_odds.any():
+        return draft, ""
+    turned, component = igl.bfs_orient(draft.F)
+    if _Draft(draft.V, turned).edges.at_odds.any():
+        raise InputError(
+            "is one-sided somewhere, like a Möbius strip, so that no normal can be chosen; cut it, "
+            "or mend it in the program that made it"
+        )
+    over = (turned != draft.F).any(axis=1)
+    against = 2 * np.bincount(component, weights=over) > np.bincount(component)
+    turned = np.where(against[component][:, None], turned[:, ::-1], turned)
+    over ^= against[component]
+    remark = f"{_count(int(over.sum()), 'face')} turned over to agree with the others"
+    return _Draft(draft.V, turned), remark
+
+
+def _parted(draft: _Draft, _: float) -> tuple[_Draft, str]:
+    """Give every fan of faces its own vertex where sheets touch in one point (bow-ties)."""
+    V, F, edges = draft.V, draft.F, draft.edges
+    m = len(F)
+    # Across half edge h, its start's corner of this face is followed by its end's of the next one.
+    following = np.full(3 * m, -1)
+    for h, twin in ((edges.one, edges.other), (edges.other, edges.one)):
+        following[(h // m + 1) % 3 * m + h % m] = (twin // m + 2) % 3 * m + twin % m
+    has_next = following >= 0
+    start = np.concatenate([[0], np.cumsum(has_next)])
+    graph = csr_array((has_next[has_next], following[has_next], start), shape=(3 * m, 3 * m))
+    fans, fan = connected_components(graph, directed=False)
+    owner = np.empty(fans, dtype=np.int64)
+    owner[fan] = F.T.ravel()
+    number = np.full(fans, -1)
+    used, keeps = np.unique(owner, return_index=True)
+    number[keeps] = used
+    added = np.flatnonzero(number < 0)
+    if len(added) == 0:
+        return draft, ""
+    number[added] = len(V) + np.arange(len(added))
+    V = np.concatenate([V, V[owner[added]]])
+    remark = f"{_count(len(added), 'bow-tie')} parted: sheets that touch in one point"
+    return _Draft(V, number[fan].reshape(3, m).T.copy()), remark

@@ -1,0 +1,76 @@
+"""What is next to what in a triangle mesh: edges, borders, components."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Integers
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Neighbourhood of faces.
+
+    Edge i of a face runs from its corner i to corner i + 1.
+
+    Attributes
+    ----------
+    faces : array of int, shape (m, 3)
+        Vertices, counter-clockwise.
+    vertices : int
+        How many there are.
+    """
+
+    faces: Integers
+    vertices: int
+
+    @cached_property
+    def _edges(self) -> tuple[Integers, Integers]:
+        """Order that sorts the half-edges (3m,) by edge, and the edge's number of each in it."""
+        a, b = self.faces, np.roll(self.faces, -1, axis=1)
+        key = (np.minimum(a, b) * self.vertices + np.maximum(a, b)).reshape(-1)
+        order = np.argsort(key, kind="stable")
+        ordered = key[order]
+        number = np.concatenate([[0], np.cumsum(ordered[1:] != ordered[:-1])])
+        return order, number
+
+    @cached_property
+    def uses(self) -> Integers:
+        """How many faces share each edge of each face, shape (m, 3)."""
+        order, number = self._edges
+        uses = np.empty(self.faces.size, dtype=np.int64)
+        uses[order] = np.bincount(number)[number]
+        return uses.reshape(-1, 3)
+
+    @cached_property
+    def neighbours(self) -> Integers:
+        """Face across each edge, shape (m, 3): -1 at a border, -2 where three or more meet."""
+        order, number = self._edges
+        first = np.flatnonzero(np.bincount(number)[number] == 2)[::2]
+        one, two = order[first], order[first + 1]
+        across = np.where(self.uses.reshape(-1) == 1, -1, -2)
+        across[one], across[two] = two // 3, one // 3
+        return across.reshape(-1, 3)
+
+    @cached_property
+    def border(self) -> Booleans:
+        """Edges with one face only, shape (m, 3)."""
+        alone: Booleans = self.uses == 1
+        return alone
+
+    @cached_property
+    def border_vertices(self) -> Booleans:
+        """Vertices at the end of a border edge, shape (vertices,)."""
+        marked = np.zeros(self.vertices, dtype=bool)
+        marked[self.faces[self.border]] = True
+        marked[np.roll(self.faces, -1, axis=1)[self.border]] = True
+        return marked
+
+    @cached_property
+    def components(self) -> Integers:
+        """Number of the connected component of each face, shape (m,); vertices connect."""
+        import igl
+
+        parts: Integers = igl.vertex_components(self.faces)[self.faces[:, 0]]
+        return parts

@@ -1,0 +1,164 @@
+"""register at the command line: where a part lies, how well that is known, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from dmpcli import cli
+from dmpcli.records import pose, streams
+from tests.records.meshes import box, obj, written
+
+V, F = box((100.0, 60.0, 40.0))
+SIX = [400.0, -120.0, 35.0, 0.2, -0.1, 1.3]
+R, T = Rotation.from_euler("XYZ", SIX[3:]).as_matrix(), np.array(SIX[:3])
+NEAR = ["402", "-118", "34", "0.22", "-0.12", "1.27"]
+
+
+def run(*args):
+    return CliRunner().invoke(cli.app, ["register", *map(str, args)])
+
+
+def table(path, points, part=None):
+    header = "x,y,z" + ("" if part is None else ",px,py,pz")
+    rows = points if part is None else np.concatenate([points, part], axis=1)
+    cells = [",".join("" if np.isnan(v) else repr(float(v)) for v in row) for row in rows]
+    path.write_text("\n".join([header, *cells]) + "\n")
+    return path
+
+
+@pytest.fixture
+def lab(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.stl").write_bytes(written(V, F, "stl"))
+    rng = np.random.default_rng(1)
+    faces = rng.integers(0, len(F), 60)
+    on_part = np.einsum("ki,kij->kj", rng.dirichlet([2.0, 2.0, 2.0], 60), V[F[faces]])
+    touched = on_part @ R.T + T + 0.02 * rng.standard_normal(on_part.shape)
+    table(tmp_path / "touched.csv", touched)
+    table(tmp_path / "corners.csv", V @ R.T + T, V)
+    mixed = np.where(np.arange(60)[:, None] < 4, on_part, np.nan)
+    table(tmp_path / "mixed.csv", touched, mixed)
+    return tmp_path
+
+
+def found(folder, name="pose.json"):
+    return pose.decode(streams.read(folder / name))
+
+
+def assert_near(folder, atol):
+    placed, _ = found(folder)
+    np.testing.assert_allclose(placed.to_base(V), V @ R.T + T, atol=atol)
+
+
+def test_point_pairs_give_the_pose(lab):
+    done = run("part.stl", "corners.csv", "-o", "pose.json")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout == ""
+    assert_near(lab, 1e-9)
+    file = found(lab)[1]
+    assert file.residuals.points == 8
+    assert file.residuals.largest < 1e-9
+    assert file.conditioning.number < 3.0
+    assert [entry["role"] for entry in file.inputs] == ["part", "touched"]
+    assert file.inputs[0]["sha256"] == streams.read(lab / "part.stl").sha256
+    assert "condition number" in done.stderr
+    assert "chordal error estimated at" in done.stderr
+    assert "least certain" in done.stderr
+
+
+def test_many_points_and_a_rough_pose_in_words_or_in_a_file_give_the_pose(lab):
+    done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", *NEAR, "-q")
+    assert done.exit_code == 0, done.stderr
+    assert done.stderr == ""
+    assert_near(lab, 0.06)
+    first = (lab / "pose.json").read_bytes()
+    file = found(lab)[1]
+    assert 0.01 < file.residuals.rms < 0.03
+    assert file.options == {"unit": "mm", "initial": " ".join(NEAR)}
+    run("part.stl", "touched.csv", "-o", "pose.json", "--initial", *NEAR)
+    assert (lab / "pose.json").read_bytes() == first
+
+    (lab / "rough.json").write_text(
+        json.dumps({"position": [*map(float, NEAR[:3])], "rotation": [*map(float, NEAR[3:])]})
+    )
+    done = run("part.stl", "touched.csv", "--initial", "rough.json", "-o", "pose.json")
+    assert done.exit_code == 0, done.stderr
+    assert_near(lab, 0.06)
+    assert [entry["role"] for entry in found(lab)[1].inputs] == ["part", "touched", "initial"]
+
+
+def test_a_few_pairs_are_a_rough_pose_for_the_rest(lab):
+    done = run("part.stl", "mixed.csv", "-o", "pose.json")
+    assert done.exit_code == 0, done.stderr
+    assert_near(lab, 0.06)
+    assert found(lab)[1].residuals.points == 60
+
+
+def test_the_parts_unit_holds_for_its_points_too(lab):
+    (lab / "metres.obj").write_bytes(obj(V / 1000.0, F))
+    table(lab / "metres.csv", V @ R.T + T, V / 1000.0)
+    done = run("metres.obj", "metres.csv", "-o", "pose.json", "--unit", "m")
+    assert done.exit_code == 0, done.stderr
+    assert_near(lab, 1e-9)
+    done = run("metres.obj", "metres.csv", "-o", "pose.json")
+    assert done.exit_code == 2
+    assert "check the part's unit of length" in done.stderr
+
+
+def test_a_residual_above_the_limit_is_refused_by_row_and_nothing_is_written(lab):
+    points = V @ R.T + T
+    points[2] += [0.0, 0.0, 5.0]
+    table(lab / "bad.csv", points, V)
+    done = run("part.stl", "bad.csv", "-o", "pose.json")
+    assert done.exit_code == 3
+    assert done.stderr.splitlines()[-2].startswith("dmpcli: bad.csv: line 4: lies ")
+    assert "more than --max-residual 1" in done.stderr
+    assert not (lab / "pose.json").exists()
+    assert run("part.stl", "bad.csv", "-o", "pose.json", "--max-residual", 9).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["touched.csv", "--max-residual", "0"], "--max-residual 0: must be"),
+        (["touched.csv", "--max-residual", "nan"], "--max-residual nan: must be"),
+        (["touched.csv", "--initial", "1", "2"], "--initial 1 2: a pose is six numbers"),
+        (["touched.csv", "--unit", "inch"], "unit inch: must be one of"),
+        (["corners.csv", "--initial", *NEAR], "leave --initial out"),
+        (["none.csv"], "none.csv: no such file"),
+        (["few.csv"], "few.csv: 3 touched points; without matching points"),
+        (["half.csv"], "half.csv: column 'pz' is missing"),
+        (["text.csv"], "text.csv: column 'py', line 3: 'two' is not a finite number"),
+        (["gap.csv"], "gap.csv: column 'y', line 2: an empty cell is not a finite number"),
+        (["top.csv"], "top.csv: the touched points leave the part free: it slides along"),
+    ],
+)
+def test_a_users_mistake_is_one_line_and_exit_code_2(lab, args, words):
+    (lab / "few.csv").write_text("x,y,z\n1,2,3\n4,5,6\n7,8,10\n")
+    (lab / "half.csv").write_text("x,y,z,px,py\n1,2,3,4,5\n")
+    (lab / "text.csv").write_text("x,y,z,px,py,pz\n1,2,3,4,5,6\n1,2,3,4,two,6\n")
+    (lab / "gap.csv").write_text("x,y,z\n1,,3\n")
+    rng = np.random.default_rng(2)
+    table(lab / "top.csv", rng.uniform(-0.4, 0.4, (20, 3)) * [100, 60, 0] + [0, 0, 20])
+    done = run("part.stl", *args, "-o", "pose.json")
+    assert done.exit_code == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert not (lab / "pose.json").exists()
+
+
+def test_what_was_mended_is_said(lab):
+    (lab / "part.obj").write_bytes(obj(V, np.concatenate([F, F[:1]])))
+    done = run("part.obj", "corners.csv", "-o", "pose.json")
+    assert done.exit_code == 0
+    assert "part.obj: 1 duplicate face left out" in done.stderr
+
+
+def test_the_pose_goes_to_standard_output_as_data_alone(lab):
+    done = run("part.stl", "corners.csv", "-o", "-")
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["schema"] == "pose"

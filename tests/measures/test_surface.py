@@ -1,0 +1,120 @@
+"""Strokes on surfaces: closed-form charts of cylinder and sphere, and tools tilted on purpose."""
+
+import numpy as np
+import pytest
+
+from dmpcli import rotations
+from dmpcli.measures import surface
+
+R = 60.0
+LENGTH = 80.0
+
+
+def stroke(height=50.0, n=401):
+    s = np.linspace(0.0, 1.0, n)
+    v = 0.5 * height * np.sin(2 * np.pi * s)
+    return np.column_stack([LENGTH * s - 6.0 * np.sin(2 * np.pi * s), v])
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def on_cylinder(uv, slant=0.6):
+    """Cylinder about y; the start-goal geodesic is a helix at `slant` to the circles."""
+    c, s = np.cos(slant), np.sin(slant)
+    a = (uv[:, 0] * c - uv[:, 1] * s) / R
+    y = uv[:, 0] * s + uv[:, 1] * c
+    point = np.column_stack([R * np.sin(a), y, R * np.cos(a)])
+    around = np.column_stack([np.cos(a), np.zeros_like(a), -np.sin(a)])
+    e_y = np.array([0.0, 1.0, 0.0])
+    return point, c * around + s * e_y, -s * around + c * e_y
+
+
+def on_sphere(uv):
+    """Sphere about the origin; the start-goal geodesic is its equator."""
+    a, b = uv[:, 0] / R, uv[:, 1] / R
+    point = R * np.column_stack([np.cos(b) * np.cos(a), np.cos(b) * np.sin(a), np.sin(b)])
+    e_u = np.column_stack([-np.sin(a), np.cos(a), np.zeros_like(a)])
+    e_v = np.column_stack([-np.sin(b) * np.cos(a), -np.sin(b) * np.sin(a), np.cos(b)])
+    return point, e_u, e_v
+
+
+def closest_on_sphere(points):
+    normal = unit(points)
+    return R * normal, normal
+
+
+def flat_guess(points):
+    """Coordinates as on the plane that touches at the start."""
+    return np.column_stack([points @ [0.0, 1.0, 0.0], points @ [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("lift", [on_cylinder, on_sphere])
+def test_coordinates_are_found_from_the_points_alone(lift):
+    uv = stroke()
+    point = lift(uv)[0]
+    guess = np.column_stack([np.linspace(0, 60.0, len(uv)), np.zeros(len(uv))])
+    assert np.abs(surface.coordinates(point, lift, guess) - uv).max() < 1e-9
+
+
+def test_v_is_the_length_of_the_perpendicular_geodesic_and_not_the_chord():
+    point = R * np.array([[np.cos(0.4), 0.0, np.sin(0.4)]])
+    ((u, v),) = surface.coordinates(point, on_sphere, flat_guess(point))
+    assert u == pytest.approx(0.0, abs=1e-9)
+    assert v == pytest.approx(0.4 * R, abs=1e-9)
+    assert v - R * np.sin(0.4) > 0.5
+
+
+def test_points_beside_the_chart_have_no_coordinates():
+    def half(uv):
+        point, e_u, e_v = on_sphere(uv)
+        return np.where(uv[:, 1:] > 10.0, np.nan, point), e_u, e_v
+
+    point = on_sphere(np.array([[30.0, 5.0], [30.0, 20.0]]))[0]
+    found = surface.coordinates(point, half, flat_guess(point))
+    assert found[0] == pytest.approx([30.0, 5.0])
+    assert np.isnan(found[1]).all()
+    assert surface.wave_along(found, LENGTH) is None
+
+
+def test_wave_height_is_measured_along_the_surface():
+    uv = surface.coordinates(on_sphere(stroke(49.98))[0], on_sphere, stroke(30.0))
+    assert surface.wave_along(uv, LENGTH).mean == pytest.approx(49.98, abs=1e-3)
+    assert surface.wave_along(stroke(0.1), LENGTH).mean is None
+
+
+def test_distance_leaves_out_the_intended_height():
+    uv = stroke()
+    point, e_u, e_v = on_sphere(uv)
+    w = 0.3 * np.sin(0.1 * uv[:, 0])
+    lifted = point + w[:, None] * np.cross(e_u, e_v)
+    assert surface.distance(lifted, closest_on_sphere, w).max() < 1e-12
+    assert surface.distance(lifted, closest_on_sphere) == pytest.approx(np.abs(w), abs=1e-12)
+    assert surface.height(lifted, closest_on_sphere) == pytest.approx(w, abs=1e-12)
+    taught = np.column_stack([uv, w])
+    assert surface.height_there(uv[::3], taught) == pytest.approx(w[::3])
+
+
+def test_tilt_is_the_angle_by_which_the_tool_was_turned():
+    point, e_u, e_v = on_sphere(stroke())
+    normal = np.cross(e_u, e_v)
+    upright = np.stack([e_u, -e_v, -normal], axis=-1)
+    assert surface.tilt(upright, normal).max() < 1e-9
+    angle = np.linspace(0.0, 3.0, len(point))
+    turned = rotations.exp(angle[:, None] * e_u) @ upright
+    assert surface.tilt(turned, normal) == pytest.approx(angle, abs=1e-9)
+
+
+def test_stretch_is_one_on_a_cylinder_and_the_cosine_on_a_parallel():
+    uv = stroke(n=4001)
+    assert surface.stretch(on_cylinder(uv)[0], uv) == pytest.approx(1.0, abs=1e-6)
+    parallel = np.column_stack([np.linspace(0, LENGTH, 2001), np.full(2001, 25.0)])
+    found = surface.stretch(on_sphere(parallel)[0], parallel)
+    assert len(found) == surface.PIECES
+    assert found == pytest.approx(np.cos(25.0 / R), abs=1e-6)
+
+
+def test_stretch_bears_samples_at_rest():
+    uv = np.repeat(stroke(), [50] + [1] * 399 + [50], axis=0)
+    assert surface.stretch(on_cylinder(uv)[0], uv) == pytest.approx(1.0, abs=1e-3)

@@ -1,0 +1,215 @@
+"""Poses from touched points: exact motions are found, noise averages out, blind sets refused."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from dmpcli.errors import InputError
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.registration import from_pairs, onto_surface
+from tests.records.meshes import box, grid
+
+BUMPY = grid(41, 90.0, lambda x, y: 6.0 * np.sin(x * 2 * np.pi / 90) * np.cos(y * 2 * np.pi / 80))
+SEEDS = st.integers(0, 10_000)
+
+
+def touched_on(V, F, count, rng, faces=None):
+    """Points spread over a mesh, or over some of its faces, by area."""
+    F = F if faces is None else F[faces]
+    a, b, c = np.moveaxis(V[F], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = rng.choice(len(F), count, p=area / area.sum())
+    return np.einsum("ki,kij->kj", rng.dirichlet([1.0, 1.0, 1.0], count), V[F[chosen]])
+
+
+def motion(rng, angle=None, shift=500.0):
+    """A random rigid motion: R, t."""
+    turn = Rotation.random(rng=rng).as_rotvec()
+    if angle is not None:
+        turn *= angle / np.linalg.norm(turn)
+    return Rotation.from_rotvec(turn).as_matrix(), rng.uniform(-shift, shift, 3)
+
+
+def closest_on(V, F):
+    surface = Mesh(V, F)
+
+    def closest(points):
+        hits = surface.closest(points)
+        return hits.position, hits.normal
+
+    return closest
+
+
+def near(R, t, centre, rng, angle, shift):
+    """A pose that is off by a turn about the part's centre and a shift."""
+    turn, _ = motion(rng, angle)
+    step = rng.standard_normal(3)
+    return turn @ R, R @ centre + t - turn @ R @ centre + shift * step / np.linalg.norm(step)
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS, st.integers(3, 12))
+def test_pairs_give_back_every_rigid_motion(seed, count):
+    rng = np.random.default_rng(seed)
+    part = rng.uniform(-100, 100, (count, 3))
+    _, spread, _ = np.linalg.svd(part - part.mean(axis=0))
+    assume(spread[1] > 0.05 * spread[0])  # not on a line
+    R, t = motion(rng)
+    found = from_pairs(part, part @ R.T + t)
+    np.testing.assert_allclose(found.rotation, R, atol=1e-9)
+    np.testing.assert_allclose(found.position, t, atol=1e-9)
+    assert found.rms < 1e-9
+    assert found.spare == 3 * count - 6
+
+
+def test_points_in_one_plane_are_enough_for_pairs_and_never_mirror():
+    part = np.array([[0.0, 0, 0], [100, 0, 0], [0, 60, 0], [90, 50, 0]])
+    R, t = motion(np.random.default_rng(4))
+    found = from_pairs(part, part @ R.T + t)
+    assert np.linalg.det(found.rotation) == pytest.approx(1.0)
+    np.testing.assert_allclose(found.rotation, R, atol=1e-9)
+
+
+def test_the_residuals_of_noisy_pairs_are_those_of_scipy():
+    rng = np.random.default_rng(5)
+    part = rng.uniform(-100, 100, (9, 3))
+    R, t = motion(rng)
+    noisy = part @ R.T + t + 0.1 * rng.standard_normal(part.shape)
+    found = from_pairs(part, noisy)
+    _, distance = Rotation.align_vectors(noisy - noisy.mean(axis=0), part - part.mean(axis=0))
+    assert found.rms == pytest.approx(distance / 3.0)
+    assert 0.02 < found.uncertainty < 0.2
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.5])
+def test_pairs_on_one_line_are_refused_with_the_turn_about_it(bend):
+    along = np.array([[-100.0, 0, 0], [-20, bend, 0], [40, 0, bend], [90, 0, 0]])
+    with pytest.raises(InputError, match=r"turns about \(1\.00, 0\.00, 0\.00\) through .*one line"):
+        from_pairs(along, along + 7.0)
+
+
+def test_too_few_pairs_one_point_and_a_wrong_unit_are_refused():
+    part = np.array([[0.0, 0, 0], [100, 0, 0], [0, 60, 0]])
+    with pytest.raises(InputError, match="2 point pairs; a pose needs 3"):
+        from_pairs(part[:2], part[:2])
+    with pytest.raises(InputError, match="all one point"):
+        from_pairs(part, np.ones((3, 3)))
+    with pytest.raises(InputError, match="check the part's unit of length"):
+        from_pairs(part / 1000.0, part)
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS, st.sampled_from(["box", "bumpy"]))
+def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
+    rng = np.random.default_rng(seed)
+    V, F = box((100.0, 60.0, 40.0)) if kind == "box" else BUMPY
+    points = touched_on(V, F, 40, rng)
+    R, t = motion(rng)
+    found = onto_surface(
+        points @ R.T + t, closest_on(V, F), *near(R, t, V.mean(axis=0), rng, 0.08, 4.0)
+    )
+    back = V @ found.rotation.T + found.position
+    np.testing.assert_allclose(back, V @ R.T + t, atol=1e-6)
+    assert found.residual.max() < 1e-6
+
+
+def test_noise_averages_out_as_the_uncertainty_says():
+    rng = np.random.default_rng(6)
+    V, F = BUMPY
+    closest = closest_on(V, F)
+    errors, told = [], []
+    for _ in range(30):
+        points = touched_on(V, F, 60, rng)
+        R, t = motion(rng)
+        noisy = points @ R.T + t + 0.05 * rng.standard_normal(points.shape)
+        found = onto_surface(noisy, closest, *near(R, t, V.mean(axis=0), rng, 0.05, 3.0))
+        moved = points @ found.rotation.T + found.position - (points @ R.T + t)
+        errors.append(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
+        told.append(found.uncertainty)
+        assert found.rms == pytest.approx(0.05, rel=0.35)
+    assert np.median(errors) < 3.0 * np.median(told)
+    assert np.median(errors) < 0.1
+
+
+def test_a_mistouched_point_is_told_and_hardly_moves_the_part():
+    rng = np.random.default_rng(7)
+    V, F = box((100.0, 60.0, 40.0))
+    points = touched_on(V, F, 40, rng)
+    R, t = motion(rng)
+    noisy = points @ R.T + t + 0.02 * rng.standard_normal(points.shape)
+    top = int(np.argmax(points[:, 2]))
+    noisy[top] += 8.0 * R[:, 2]
+    found = onto_surface(noisy, closest_on(V, F), *near(R, t, np.zeros(3), rng, 0.05, 3.0))
+    assert int(np.argmax(found.residual)) == top
+    assert found.residual[top] == pytest.approx(8.0, abs=0.2)
+    assert np.median(found.residual) < 0.03
+    moved = V @ found.rotation.T + found.position - (V @ R.T + t)
+    assert np.abs(moved).max() < 0.15
+
+
+def flat():
+    return grid(9, 50.0, lambda x, y: 0.0 * x)
+
+
+def tube():
+    made = trimesh.creation.cylinder(60.0, 300.0, sections=90)
+    V, F = np.array(made.vertices, dtype=float), np.array(made.faces)
+    side = np.ptp(V[F][:, :, 2], axis=1) > 1.0
+    return V, F[side]
+
+
+def ball():
+    made = trimesh.creation.icosphere(4, 50.0)
+    return np.array(made.vertices, dtype=float), np.array(made.faces)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "free"),
+    [
+        (flat, ["slides along", "slides along", "turns about (0.00, 0.00, 1.00)"]),
+        (tube, ["slides along (0.00, 0.00, 1.00)", "turns about (0.00, 0.00, 1.00)"]),
+        (ball, ["turns about"] * 3),
+    ],
+)
+def test_a_part_that_can_slide_under_the_points_is_refused_with_its_motions(mesh, free):
+    rng = np.random.default_rng(8)
+    V, F = mesh()
+    points = touched_on(V, F, 60, rng)
+    with pytest.raises(InputError) as error:
+        onto_surface(points, closest_on(V, F), np.eye(3), np.array([0.01, 0.0, 0.01]))
+    named = str(error.value).split("free: it ")[1].split("; ")
+    assert len(named) == len(free) + 1
+    for said, expected in zip(named[:-1], free, strict=True):
+        assert said.startswith(expected)
+
+
+def test_a_box_touched_on_one_face_only_is_refused():
+    rng = np.random.default_rng(9)
+    V, F = box((100.0, 60.0, 40.0))
+    top = np.flatnonzero((V[F][:, :, 2] > 19.0).all(axis=1))
+    points = touched_on(V, F, 30, rng, top) * [0.8, 0.8, 1.0]
+    with pytest.raises(InputError, match=r"slides along .*slides along .*turns about"):
+        onto_surface(points, closest_on(V, F), np.eye(3), np.zeros(3))
+
+
+def test_motions_are_named_in_the_base_frame():
+    rng = np.random.default_rng(10)
+    V, F = tube()
+    R = Rotation.from_euler("y", 90, degrees=True).as_matrix()
+    points = touched_on(V, F, 60, rng) @ R.T + [0.0, 30.0, 200.0]
+    with pytest.raises(InputError) as error:
+        onto_surface(points, closest_on(V, F), R, np.array([0.0, 30.0, 200.0]))
+    slide, turn, _ = str(error.value).split("; ")
+    assert slide.endswith("slides along (1.00, 0.00, 0.00)")
+    assert turn.startswith("turns about (1.00, 0.00, 0.00) through (")
+    through = [float(word) for word in turn.split("(")[2].split(")")[0].split(",")]
+    np.testing.assert_allclose(through[1:], [30.0, 200.0], atol=0.2)
+
+
+def test_six_touched_points_are_too_few():
+    V, F = BUMPY
+    with pytest.raises(InputError, match="6 touched points"):
+        onto_surface(V[:6], closest_on(V, F), np.eye(3), np.zeros(3))
