@@ -139,6 +139,7 @@ pictures: reproduce
 	$(DMPCLI) report sample_runs/reference.parquet $(R)/reference/paper-table2.parquet \
 	    $(R)/reference/distance-table2.parquet -o $(R)/table2-report -q > $(R)/table2.txt
 	cp $(R)/table2-report/fig8_generalization_plane.png docs/images/table2.png
+	cp $(R)/reference/curved/fig9_surface.png docs/images/fig9.png
 	cp $(R)/drag/report/fig4_drag_plane.png docs/images/drag.png
 
 # The sample runs are kept in the repository; this makes them again, byte for byte.
