@@ -115,7 +115,8 @@ def footing_of(stroke: Stroke, surface: Surface, reference: Stroke | None) -> Fo
         return hits.position, sign * hits.normal
 
     foot, normal = closest(stroke.position)
-    length, uv, remark = _coordinates(stroke, surface, ends.position, foot, side)
+    upward = (sign * ends.normal)[0]
+    length, uv, remark = _coordinates(stroke, surface, ends.position, foot, upward)
     demonstrated = None if length is None else _stretched(reference, length)
     off = None
     # The original model has no w: it does not know what off the surface means.
@@ -147,40 +148,38 @@ def _stretched(reference: Stroke | None, length: float) -> Floats | None:
 
 
 def _coordinates(
-    stroke: Stroke, surface: Surface, ends: Floats, foot: Floats, side: Floats | None
+    stroke: Stroke, surface: Surface, ends: Floats, foot: Floats, normal: Floats
 ) -> tuple[float | None, Floats | None, str | None]:
     """Geodesic distance of the ends, chart coordinates of the feet, and why there are none."""
     if stroke.closed:
         return None, None, "closed, so there is no line to measure waves from"
-    charts = surface.charts(ends[:1], ends[1:], side)
+    charts = surface.charts(ends[:1], ends[1:], normal)
     status = Status(charts.status[0])
     if status != Status.DRAWN:
         return None, None, status.reason
     length = float(charts.lengths[0])
-    states: set[Status] = set()
+    last = Status.DRAWN
 
     def lift(uv: Floats) -> tuple[Floats, Floats, Floats]:
+        nonlocal last
         lifted = charts.lift(np.column_stack([uv, np.zeros(len(uv))])[None])
-        states.add(Status(lifted.status[0]))
-        gone = np.broadcast_to(lifted.outside[0], len(uv)) | (
-            lifted.status[0] not in (Status.DRAWN, Status.BORDER)
-        )
+        last = Status(lifted.status[0])
+        reached = last in (Status.DRAWN, Status.BORDER)
+        gone = np.broadcast_to(lifted.outside[0] | (not reached), len(uv))
         point = np.where(gone[:, None], np.nan, lifted.position[0])
         return point, lifted.axes[0, :, :, 0], lifted.axes[0, :, :, 1]
 
-    uv = measure.coordinates(foot, lift, _guess(foot, ends, lift, length))
+    uv = measure.coordinates(foot, lift, _guess(foot, ends, normal, length))
     if np.isfinite(uv).all():
         return length, uv, None
-    odd = [s for s in states if s not in (Status.DRAWN, Status.BORDER)]
-    return length, None, (odd[0] if odd else Status.BORDER).reason
+    return length, None, (Status.BORDER if last == Status.DRAWN else last).reason
 
 
-def _guess(foot: Floats, ends: Floats, lift: measure.Lift, length: float) -> Floats:
+def _guess(foot: Floats, ends: Floats, normal: Floats, length: float) -> Floats:
     """Coordinates as on a plane through both ends."""
-    _, e_u, e_v = lift(np.zeros((1, 2)))
     way = ends[1] - ends[0]
     chord = float(np.linalg.norm(way))
-    aside = np.cross(np.cross(e_u[0], e_v[0]), way)
+    aside = np.cross(normal, way)
     offset = foot - ends[0]
     u = offset @ way * (length / chord**2)
     return np.stack([u, offset @ aside / np.linalg.norm(aside)], axis=1)

@@ -88,12 +88,13 @@ def _curve(stroke: Stroke, strokes: Sequence[Stroke], plain: bool) -> Curve:
     assert footing is not None
     bare = curve_of(stroke)
     name = STYLES[stroke.role].name
-    if not plain:
-        if sum(other.role == stroke.role for other in strokes) > 1:
-            name = f"{name} ({stroke.label})"
-        mean = stroke.wave.mean if stroke.bound and footing.wave is not None else None
-        height = "" if mean is None else f", {mean:.2f} mm"
-        name = f"{name}{height}, off by {np.abs(footing.height).max():.3f} mm"
+    if plain:
+        return bare.unmarked(name)
+    if sum(other.role == stroke.role for other in strokes) > 1:
+        name = f"{name} ({stroke.label})"
+    mean = stroke.wave.mean if stroke.bound and footing.wave is not None else None
+    height = "" if mean is None else f", {mean:.2f} mm"
+    name = f"{name}{height}, off by {np.abs(footing.height).max():.3f} mm"
     return replace(bare, name=name, marks_t=bare.marks_t[:0], marks=bare.marks[:0])
 
 
@@ -194,9 +195,10 @@ def _view(
                 solid_capstyle="round",
             )  # fmt: skip
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), "XYZ", strict=True):
+    named = ((axes.xaxis, "X", 9.0), (axes.yaxis, "Y", 9.0), (axes.zaxis, "Z", 3.0))
+    for axis, name, away in named:
         axis.set_label_text(f"{name} / mm")
-        axis.labelpad = 6.0
+        axis.labelpad = away
         axis.set_major_locator(MaxNLocator(5, min_n_ticks=2))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     axes.tick_params(pad=0.0)

@@ -7,7 +7,6 @@ cylinders, spheres and meshes are measured alike.
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dmpcli.arrays import Floats
 from dmpcli.measures.wave import LINE, WaveHeights, wave_heights
@@ -30,7 +29,7 @@ ASTRAY = 1e-2
 PIECES = 100
 """A stroke's stretch is taken over so many pieces of equal length."""
 
-_MOST_STEPS = 30
+_MOST_STEPS = 20
 _DIFFERENCE = 0.5
 _LEAST_SLOPE = 0.05
 
@@ -72,6 +71,8 @@ def height_there(uv: Floats, demonstrated: Floats) -> Floats:
     array, shape (n,)
         mm.
     """
+    from scipy.spatial import cKDTree
+
     _, nearest = cKDTree(demonstrated[:, :2]).query(uv)
     return np.asarray(demonstrated[nearest, 2])
 
