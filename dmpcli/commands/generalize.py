@@ -436,7 +436,7 @@ def _write_batch(
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     task = dataset.Task(skill, given, settings.style(), on_border)
     with progress("drawing", int(table.good.sum()), quiet) as advance, about("skill"):
-        dataset.write(
+        unfolded = dataset.write(
             output,
             task,
             table,
@@ -446,6 +446,8 @@ def _write_batch(
             on_error == "stop",
             advance,
         )
+    if unfolded:
+        warn(f"{unfolded} strokes cross a sharp crease, where no tool can follow the surface")
     bad = [status for status in table.status if status != OK]
     for status in bad[:SHOWN]:
         tell(f"{table.name}: skipped: {status}", quiet)

@@ -56,7 +56,7 @@ def write(
     provenance: Provenance,
     stop: bool,
     advance: Callable[[int], None],
-) -> None:
+) -> int:
     """Draw the good pairs of a table part by part, and last the table itself.
 
     Parameters
@@ -75,6 +75,11 @@ def write(
     advance : callable
         Told how many pairs are done.
 
+    Returns
+    -------
+    int
+        How many of the strokes cross a sharp crease.
+
     Raises
     ------
     RefusedError
@@ -84,6 +89,7 @@ def write(
     normal = np.full((len(table), 3), np.nan)
     lasting = duration.copy()
     part_of = [""] * len(table)
+    unfolded = 0
     provenance = replace(
         provenance, facts=trajectory.facts_of(task.skill) | {"rate": task.style.rate}
     )
@@ -96,6 +102,7 @@ def write(
             for row, stroke in kept:
                 lasting[row] = stroke.timing.t[-1]
                 part_of[row] = name
+                unfolded += stroke.unfolded
                 if stroke.normal is not None and len(stroke.normal) == 1:
                     normal[row] = stroke.normal[0]
             if kept:
@@ -108,6 +115,7 @@ def write(
             table.ids, pairs, lasting, normal, part_of, table.status, provenance
         )
         streams.write(place / streams.TABLE, record.encode(done))
+    return unfolded
 
 
 def _keep(
