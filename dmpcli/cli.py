@@ -29,8 +29,6 @@ class Group(TyperGroup):
             print(f"dmpcli: {error}", file=sys.stderr)  # noqa: T201
             sys.exit(error.exit_code)
         except BrokenPipeError:
-            # The reader has gone; Python would say so once more at its end.
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
             sys.exit(128 + signal.SIGPIPE)
 
 

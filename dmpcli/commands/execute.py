@@ -40,7 +40,7 @@ def command(
         Literal["force"] | None, typer.Option(help="Press on the surface, eq. (10).")
     ] = None,
     force_setpoint: Annotated[
-        float | None, typer.Option(metavar="N", help="Force to press with.")
+        float | None, typer.Option(metavar="N", help="Force to press with (5).")
     ] = None,
     speed: Annotated[
         float | None, typer.Option(metavar="F", help="1 as planned, 0.5 at half the speed.")
@@ -115,6 +115,8 @@ def command(
     settings = resolve(ExecuteSettings, "execute", given, preset, config)
     if coupling is None and force_setpoint is not None:
         raise InputError("--force-setpoint: nothing presses without --coupling force")
+    if max_force is not None and sensor is None and coupling is None:
+        raise InputError("--max-force: nothing feels a force without --sensor URL")
     if output is None and not dry_run:
         raise InputError("-o: name the run file, or ask for the checks alone with --dry-run")
     _execute(
@@ -154,14 +156,16 @@ class Request:
 
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
     from dmpcli.commands.messages import tell
-    from dmpcli.instruments import urls
+    from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.streaming import preflight, session, stroke_file, verdict
     from dmpcli.streaming.loop import Arm
 
     sensor = request.sensor or urls.MOCK
     addresses = urls.check(request.robot, sensor, request.allow_mixed)
-    repeatable = all(address.simulated for address in addresses)
+    if request.sensor is not None:
+        urls.need_tool(addresses[1], request.tool is not None)
+    repeatable = urls.repeatable(addresses)
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
     found = stroke_file.find(request.trajectory, request.stroke_id)
@@ -185,8 +189,9 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         provenance = _provenance(settings, request, found, coupling, tool_file, bench.simulated)
         outcome = _stream(loop, provenance, request, realtime)
     finally:
-        bench.sensor.close()
-        bench.robot.close()
+        closing = guards.leave(bench.robot.close, bench.sensor.close)
+    if closing is not None and outcome.error is None:
+        raise closing
     _end(outcome, request)
 
 
@@ -234,7 +239,7 @@ def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
     if tool_file is not None:
         return tool.decode(tool_file)
     if bench.lab is None:
-        raise InputError("--sensor: a real sensor needs the tool on it: --tool FILE")
+        raise InputError("--sensor: without the mock lab the tool is not known: --tool FILE")
     return bench.lab.scene.tool
 
 
@@ -254,12 +259,11 @@ def _provenance(
     inputs = [input_of("trajectory", found.source)]
     if tool_file is not None and request.sensor is not None:
         inputs.append(input_of("tool", tool_file))
-    named = {"robot": request.robot, "sensor": request.sensor}
-    instruments = {
-        role: url if url is None or url.startswith(urls.MOCK) else url.partition(":")[0]
-        for role, url in named.items()
+    options = settings.model_dump(mode="json")
+    options |= {
+        "robot": urls.in_provenance(request.robot),
+        "sensor": urls.in_provenance(request.sensor),
     }
-    options = settings.model_dump(mode="json") | instruments
     options |= {"id": found.stroke.id, "coupling": "force" if request.presses else None}
     facts = {"simulated": simulated, "trajectory": found.facts}
     if coupling is not None:
@@ -297,5 +301,5 @@ def _end(outcome: "Outcome", request: Request) -> None:
     if outcome.signal is not None:
         warn(outcome.reason)
         raise typer.Exit(128 + outcome.signal)
-    missed = f", {outcome.missed} set-points missed" if outcome.missed else ""
+    missed = f", {outcome.missed} deadlines missed" if outcome.missed else ""
     tell(f"{request.output}: {outcome.reason}{missed}", request.quiet)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.streams import Source
 
+Box = tuple[float, float, float, float, float, float]
+
 
 def command(
     output: Annotated[str, typer.Option("--output", "-o", help="Demonstration; - is stdout.")],
@@ -47,6 +49,13 @@ def command(
         float | None, typer.Option(help="Of the sine, peak to trough, mm.")
     ] = None,
     periods: Annotated[float | None, typer.Option(help="Of the sine.")] = None,
+    following_error: Annotated[
+        float | None, typer.Option(metavar="MM", help="Stop when the arm strays further.")
+    ] = None,
+    workspace: Annotated[
+        Box | None,
+        typer.Option(metavar="XMIN XMAX YMIN YMAX ZMIN ZMAX", help="Box to stay in, mm."),
+    ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Pace the mock.")] = False,
     allow_mixed: Annotated[
         bool, typer.Option("--allow-mixed", help="Let a real instrument stand beside a mock one.")
@@ -58,7 +67,7 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     from dmpcli.drag import enter, references, rehearsal
-    from dmpcli.drag.loop import Recorder
+    from dmpcli.drag.loop import DEFECT, Ending, Recorder
     from dmpcli.drag.settings import RecordSettings, check
     from dmpcli.instruments import urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
@@ -78,14 +87,18 @@ def command(
         "goal": goal,
         "wave_height": wave_height,
         "periods": periods,
+        "following_error": following_error,
+        "workspace": workspace,
     }
     settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
     addresses = urls.check(robot, sensor, allow_mixed)
-    simulated = any(address.simulated for address in addresses)
+    urls.need_tool(addresses[1], tool is not None)
+    repeatable = urls.repeatable(addresses)
+    realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)
-    check_output(output, simulated, force)
+    check_output(output, repeatable, force)
     tool_source = streams.read(tool) if tool else None
     stroke = references.build(settings)
     clock = MonotonicClock() if realtime else SimulatedClock()
@@ -93,7 +106,9 @@ def command(
         robot, sensor, clock, allow_mixed=allow_mixed, scene=rehearsal.scene(stroke, settings)
     )
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
-    with Interruption() as signals, _status(realtime and not quiet):
+    ending = Ending(DEFECT)
+    # Entered until the file is there: a signal meanwhile must not cost the recording.
+    with Interruption() as signals:
         recorder = Recorder(
             bench.robot,
             bench.sensor,
@@ -101,16 +116,28 @@ def command(
             tool_file.decode(tool_source) if tool_source else PEN.with_zero(None),
             settings,
             rehearsed.longest,
-            lambda: signals.number is not None or (realtime and enter.pressed()),
+            signals,
+            lambda: realtime and enter.pressed(),
             rehearsed.begin,
             rehearsed.lead_in,
         )
-        ending = recorder.run()
-    if len(recorder.log):
-        options = {"robot": robot, "sensor": sensor, "realtime": realtime}
-        facts = {"simulated": simulated, "reference": stroke.facts, "ended": ending.reason}
-        content = _file(recorder, settings, options, facts, tool_source, stroke.source)
-        streams.write(output, content)
+        try:
+            with _status(realtime and not quiet):
+                ending = recorder.run()
+        finally:
+            if len(recorder.log):
+                options = {
+                    "robot": urls.in_provenance(robot),
+                    "sensor": urls.in_provenance(sensor),
+                    "realtime": realtime,
+                }
+                facts = {
+                    "simulated": bench.simulated,
+                    "reference": stroke.facts,
+                    "ended": ending.reason,
+                }
+                content = _file(recorder, settings, options, facts, tool_source, stroke.source)
+                streams.write(output, content)
     tell(_summary(output, recorder, ending), quiet)
     if ending.failure is not None:
         raise ending.failure
@@ -118,7 +145,7 @@ def command(
         raise typer.Exit(128 + signals.number)
 
 
-def check_output(output: str, simulated: bool, force: bool) -> None:
+def check_output(output: str, repeatable: bool, force: bool) -> None:
     """Refuse an output that cannot be written, or that holds what cannot be recorded again.
 
     Raises
@@ -129,7 +156,7 @@ def check_output(output: str, simulated: bool, force: bool) -> None:
     from dmpcli.records import streams
 
     streams.check_writable(output)
-    if not simulated and not force and output != streams.DASH and Path(output).exists():
+    if not repeatable and not force and output != streams.DASH and Path(output).exists():
         raise InputError(
             f"{output}: exists, and a recording cannot be made again; choose another name, or "
             "give --force"

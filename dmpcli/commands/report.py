@@ -210,4 +210,6 @@ def _width() -> int:
     import shutil
     import sys
 
-    return max(shutil.get_terminal_size().columns, _WIDTH) if sys.stdout.isatty() else _WIDTH
+    if sys.stdout is None or not sys.stdout.isatty():
+        return _WIDTH
+    return max(shutil.get_terminal_size().columns, _WIDTH)

@@ -3,16 +3,25 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
+from dmpcli.instruments import guards
 from dmpcli.primitives.admittance import Bounds, Law, check_stable
 from dmpcli.records.settings import Settings
 
-Six = tuple[float, float, float, float, float, float]
-Three = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+# Wide enough for any tool, and no product of two of them overflows.
+Coefficient = Annotated[float, Field(ge=-1e9, le=1e9)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Six = tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient, Coefficient]
+Three = tuple[Coordinate, Coordinate, Coordinate]
+Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
+NotNegative = Annotated[float, Field(ge=0, le=1e6)]
+Workspace = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate],
+    AfterValidator(guards.ordered),
+]
+_LIGHTEST = 1e-9
 
 
 class RecordSettings(Settings):
@@ -23,14 +32,14 @@ class RecordSettings(Settings):
     mass: Six
     damping: Six
     stiffness: Six
-    control_rate: Annotated[float, Field(gt=0, le=1000, description="Hz")] = 50.0
-    sensor_rate: Annotated[float, Field(gt=0, le=7000, description="Hz")] = 100.0
+    control_rate: Annotated[float, Field(ge=1, le=1000, description="Hz")] = 50.0
+    sensor_rate: Annotated[float, Field(ge=1, le=7000, description="Hz")] = 100.0
 
     # Compensation.
-    low_pass: Annotated[float, Field(gt=0, description="cut-off, Hz")] = 10.0
+    low_pass: Annotated[float, Field(ge=1e-3, le=1e4, description="cut-off, Hz")] = 10.0
     dead_band_force: Annotated[NotNegative, Field(description="N")] = 1.0
     dead_band_torque: Annotated[NotNegative, Field(description="N·m")] = 0.05
-    bias_time: Annotated[float, Field(gt=0, le=60, description="s at rest for the zero")] = 0.5
+    bias_time: Annotated[float, Field(ge=0.01, le=60, description="s at rest for the zero")] = 0.5
 
     # Bounds of the reference's motion.
     speed: Annotated[Positive, Field(description="mm/s")] = 250.0
@@ -38,18 +47,24 @@ class RecordSettings(Settings):
     turning: Annotated[Positive, Field(description="rad/s")] = 0.8
     turning_acceleration: Annotated[Positive, Field(description="rad/s²")] = 8.0
 
+    # When the loop stops by itself. The distances are from every set-point of the last look-ahead
+    # and a tenth of a second; the built-in drag has no set-points, only the workspace counts.
+    following_error: Annotated[Positive, Field(description="mm")] = 5.0
+    following_angle: Annotated[Positive, Field(description="rad")] = 0.1
+    workspace: Annotated[Workspace | None, Field(description="box for the TCP, mm")] = None
+
     # The recording.
     drag: Literal["admittance", "builtin"] = "admittance"
-    duration: Annotated[float | None, Field(gt=0, le=3600, description="s")] = None
-    until_rest: Annotated[float | None, Field(gt=0, le=60, description="s")] = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    duration: Annotated[float | None, Field(ge=0.1, le=3600, description="s")] = None
+    until_rest: Annotated[float | None, Field(ge=0.01, le=60, description="s")] = None
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
 
     # The mock tutor's stroke: the paper's, unless said otherwise.
     reference: str = "sine"
     start: Three = (-551.030, 131.399, -17.560)
     goal: Three = (-660.021, 130.034, -17.538)
     wave_height: Annotated[Positive, Field(description="mm, peak to trough")] = 49.979
-    periods: Annotated[float, Field(gt=0, le=100)] = 1.0
+    periods: Annotated[float, Field(ge=0.01, le=100)] = 1.0
 
     @property
     def law(self) -> Law:
@@ -78,10 +93,14 @@ def check(settings: RecordSettings) -> None:
     Raises
     ------
     InputError
-        The admittance model is unstable, the sensor is slower than the control loop, or the
-        low-pass is above what the sensor's rate can show.
+        The admittance model is unstable or has no mass to speak of, the sensor is slower than the
+        control loop, or the low-pass is above what the sensor's rate can show.
     """
     check_stable(settings.law)
+    if min(settings.mass) < _LIGHTEST:
+        raise InputError(
+            f"[record] mass = {min(settings.mass):g}: must be {_LIGHTEST:g} or more on every axis"
+        )
     if settings.sensor_rate < settings.control_rate:
         raise InputError(
             f"[record] sensor_rate = {settings.sensor_rate:g} Hz is below control_rate = "

@@ -140,7 +140,7 @@ class Trail:
     """
 
     def __init__(self, info: ServoInfo, period: float, distance: float, angle: float) -> None:
-        window = int(np.ceil((info.lookahead + LAG) / period)) + 1
+        window = int(np.ceil((info.lookahead + LAG) / period - 1e-9)) + 1
         self._sent: deque[tuple[Floats, Floats]] = deque(maxlen=window)
         self._distance, self._angle = distance, angle
 

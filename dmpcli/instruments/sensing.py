@@ -98,7 +98,7 @@ class Sensing:
 
     def fresh(self, now: float) -> bool:
         """Tell whether the newest sample is young enough to be believed."""
-        return now - self.newest.t <= self._stale
+        return now - self.newest.t <= self._stale + 1e-9  # less is rounding
 
     def _poll(self) -> list[Sample]:
         samples = self._sensor.poll()

@@ -1,7 +1,7 @@
 """URLs name instruments: ``mock:`` with its options; the makes to come are known by name."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from urllib.parse import parse_qsl
 
@@ -39,6 +39,7 @@ MOCK_KEYS = {
 
 _NOT_NEGATIVE = {"friction", "lag", "seed", "estop_at", "silent_at", "refuse_at"}
 _POSITIVE = {"stiffness", "speed"}
+_SMALLEST, _LARGEST, _LONGEST_LAG = 1e-6, 1e6, 10.0
 
 
 @dataclass(frozen=True)
@@ -120,13 +121,61 @@ def _number(where: str, key: str, text: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise InputError(f"{where} = {text!r}: a finite number is needed ({MOCK_KEYS[key]})")
+    largest = _LONGEST_LAG if key == "lag" else _LARGEST
+    if abs(value) > largest and key != "seed":
+        raise InputError(f"{where} = {text}: must lie within ±{largest:g} ({MOCK_KEYS[key]})")
     if value < 0.0 and key in _NOT_NEGATIVE:
         raise InputError(f"{where} = {text}: must not be negative ({MOCK_KEYS[key]})")
-    if value <= 0.0 and key in _POSITIVE:
-        raise InputError(f"{where} = {text}: must be above 0 ({MOCK_KEYS[key]})")
+    if value < _SMALLEST and key in _POSITIVE:
+        raise InputError(f"{where} = {text}: must be {_SMALLEST:g} or more ({MOCK_KEYS[key]})")
     if key == "seed" and value != int(value):
         raise InputError(f"{where} = {text}: must be a whole number")
     return value
+
+
+def in_provenance(url: str | None) -> str | None:
+    """Return what a file may say of an instrument: all of a mock's URL, of a real one its scheme.
+
+    Parameters
+    ----------
+    url : str or None
+        None where there is no such instrument.
+    """
+    if url is None or url.startswith(MOCK):
+        return url
+    return url.partition(":")[0]
+
+
+def repeatable(addresses: Iterable[Address]) -> bool:
+    """Tell whether a run can be made again: all of its instruments are simulated.
+
+    One real instrument makes it a measurement, which is paced by the real clock and whose file is
+    not replaced unasked.
+
+    Parameters
+    ----------
+    addresses : iterable of Address
+    """
+    return all(address.simulated for address in addresses)
+
+
+def need_tool(sensor: Address, given: bool) -> None:
+    """Refuse a real sensor without the tool on it; the mock knows its own.
+
+    Parameters
+    ----------
+    sensor : Address
+    given : bool
+        Whether there is a tool file.
+
+    Raises
+    ------
+    InputError
+    """
+    if not (sensor.simulated or given):
+        raise InputError(
+            f"--sensor {sensor.scheme}://{sensor.host}: a real sensor needs its tool: --tool FILE"
+        )
 
 
 @dataclass(frozen=True)

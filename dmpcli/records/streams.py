@@ -82,9 +82,11 @@ def say(content: bytes) -> None:
     try:
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        raise
     except OSError as error:
+        # What is left in the buffer would be tried, and fail, once more when Python ends.
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        if isinstance(error, BrokenPipeError):
+            raise
         raise InputError(f"standard output: cannot be written: {error.strerror}") from None
 
 

@@ -14,6 +14,8 @@ from dmpcli.streaming.plan import Plan
 
 # The force has settled when it stays this near to the set-point for this long.
 SETTLED_SHARE, SETTLED_TIME = 0.1, 0.1
+# A coupling so slow that it has found nothing by then is a mistake, s.
+LONGEST_SEEKING = 60.0
 
 
 class Pressing:
@@ -63,7 +65,7 @@ class Pressing:
         law = self._law
         if not self._state.touched and law.clamp - abs(self._state.e) < 1e-9:
             return f"no contact within {law.clamp:g} mm of the plan"
-        if self._sought > 5.0 + 2.0 * law.clamp / self._seek:
+        if self._sought > min(5.0 + 2.0 * law.clamp / self._seek, LONGEST_SEEKING):
             return f"the force does not settle at {law.setpoint:g} N"
         return ""
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from dmpcli.instruments.guards import Box
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -13,8 +15,7 @@ class Limits:
         Of the TCP, mm/s, mm/s², mm/s³.
     rotation_speed, rotation_acceleration, rotation_jerk : float
         rad/s, rad/s², rad/s³.
-    workspace : tuple of float, or None
-        xmin, xmax, ymin, ymax, zmin, zmax, mm, base frame.
+    workspace : Box or None
     """
 
     speed: float
@@ -23,4 +24,4 @@ class Limits:
     rotation_speed: float
     rotation_acceleration: float
     rotation_jerk: float
-    workspace: tuple[float, float, float, float, float, float] | None = None
+    workspace: Box | None = None

@@ -7,12 +7,15 @@ import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
 from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.spline import Spline, spline
 
 # Below these the arm stands at the start: a thousandth of a millimetre, and of a degree or so.
 _AT_START = 1e-3
 _AT_START_ANGLE = 2e-5
+# More set-points than this are a mistake: more than an hour at a period of 20 ms.
+LONGEST = 200_000
 
 
 @dataclass(frozen=True)
@@ -138,11 +141,16 @@ def make(
         Actual pose, mm.
     approach : float
         Peak speed of the straight way to the stroke's start, mm/s.
+
+    Raises
+    ------
+    InputError
+        There would be more than `LONGEST` set-points.
     """
     held = np.broadcast_to(start[1], (len(stroke.t), 3, 3))
     rotation = held if stroke.rotation is None else stroke.rotation
     step = period * speed
-    cycles = int(np.ceil((stroke.t[-1] - stroke.t[0]) / step - 1e-9))
+    cycles = _cycles(float(stroke.t[-1] - stroke.t[0]) / step - 1e-9, period, "the stroke")
     t = np.minimum(stroke.t[0] + np.arange(cycles + 1) * step, stroke.t[-1])
     position, turned = _resample(stroke.t, stroke.position, rotation, t)
     normal = None if stroke.normal is None else _unit(_linear(stroke.t, stroke.normal, t))
@@ -186,7 +194,7 @@ def _approach(
         np.sqrt(5.7735 * max(distance / limits.acceleration, angle / limits.rotation_acceleration)),
         np.cbrt(60.0 * max(distance / limits.jerk, angle / limits.rotation_jerk)),
     )
-    cycles = int(np.ceil(duration / period))
+    cycles = _cycles(float(duration) / period, period, "the way to its start")
     s = np.arange(cycles) / cycles
     u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     turn = rotations.log(goal[1] @ start[1].T)
@@ -194,6 +202,15 @@ def _approach(
         start[0] + u[:, None] * (goal[0] - start[0]),
         rotations.exp(u[:, None] * turn) @ start[1],
     )
+
+
+def _cycles(cycles: float, period: float, what: str) -> int:
+    if not cycles <= LONGEST:
+        raise InputError(
+            f"{what} would take {cycles * period:.3g} s, over {LONGEST} set-points of {period:g} "
+            "s; raise --speed, --approach or the limits, or shorten the trajectory"
+        )
+    return int(np.ceil(cycles))
 
 
 def _resample(t: Floats, position: Floats, R: Floats, at: Floats) -> tuple[Floats, Floats]:

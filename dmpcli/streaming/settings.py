@@ -3,15 +3,22 @@
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
+from dmpcli.instruments import guards
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law
 from dmpcli.records.settings import Settings
 from dmpcli.streaming.limits import Limits
 
-Positive = Annotated[float, Field(gt=0)]
+# No product of two of them overflows.
+Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Workspace = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate],
+    AfterValidator(guards.ordered),
+]
 
 
 class ExecuteSettings(Settings):
@@ -25,14 +32,14 @@ class ExecuteSettings(Settings):
     """
 
     period: Positive = 0.02
-    speed: Positive = 1.0
+    speed: Annotated[float, Field(ge=0.001, le=10)] = 1.0
     max_speed: Positive = 250.0
     max_acceleration: Positive = 2250.0
     max_jerk: Positive = 50_000.0
     max_rotation_speed: Positive = 0.785
     max_rotation_acceleration: Positive = 15.0
     max_rotation_jerk: Positive = 333.0
-    workspace: tuple[float, float, float, float, float, float] | None = None
+    workspace: Workspace | None = None
     # Inside the tolerance the arm is led to the start at lead_speed; beyond, only when asked.
     start_tolerance: Positive = 2.0
     start_angle: Positive = 0.035
@@ -43,25 +50,17 @@ class ExecuteSettings(Settings):
     following_error: Positive = 5.0
     following_angle: Positive = 0.1
     max_force: Positive = 50.0
-    force_setpoint: Positive | None = None
+    # Of a marking pen; a polishing pad wants more.
+    force_setpoint: Positive = 5.0
     # M/D = 40 ms and no spring: the force settles at the set-point without a steady error, on a
     # plate of 5 N/mm behind 0.1 s of delay within about a second. It seeks at F_d/D.
     coupling_mass: Positive = 0.08
     coupling_damping: Positive = 2.0
-    coupling_stiffness: Annotated[float, Field(ge=0)] = 0.0
+    coupling_stiffness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     coupling_clamp: Positive = 5.0
     coupling_contact: Positive = 0.5
     coupling_patience: Positive = 0.1
     coupling_release: Positive = 10.0
-
-    @model_validator(mode="after")
-    def _box(self) -> "ExecuteSettings":
-        box = self.workspace
-        if box is not None and not all(
-            low < high for low, high in zip(box[::2], box[1::2], strict=True)
-        ):
-            raise ValueError("each minimum of the workspace must lie below its maximum")
-        return self
 
     @property
     def limits(self) -> Limits:
@@ -82,10 +81,13 @@ class ExecuteSettings(Settings):
         Raises
         ------
         InputError
-            It would be unstable at the servo period.
+            It would be unstable at the servo period, or press as hard as the run allows.
         """
-        if self.force_setpoint is None:
-            raise InputError("--coupling force needs a force to press with: --force-setpoint N")
+        if self.force_setpoint >= self.max_force:
+            raise InputError(
+                f"--force-setpoint {self.force_setpoint:g}: is not below --max-force "
+                f"{self.max_force:g}, at which the run stops"
+            )
         model = admittance.Law(
             np.array([self.coupling_mass]),
             np.array([self.coupling_damping]),

@@ -7,6 +7,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
@@ -194,6 +196,9 @@ def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):
     [
         (("--speed", 0), "--speed = 0"),
         (("--speed", "nan"), "--speed"),
+        (("--speed", 1e-9), "--speed = 1e-09"),
+        (("--speed", 11), "--speed = 11"),
+        (("--robot", "mock:?x=-500", "--approach", 1e-6), "200000 set-points"),
         (("--period", -0.02), "--period"),
         (("--period", 1.0), "--period 1"),
         (("--max-jerk", "inf"), "--max-jerk"),
@@ -201,7 +206,8 @@ def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):
         (("--robot", "elite://10.0.0.1"), "elite"),
         (("--robot", "nonsense"), "nonsense"),
         (("--force-setpoint", 5), "--coupling force"),
-        (("--coupling", "force"), "--force-setpoint"),
+        (("--coupling", "force", "--force-setpoint", 50), "is not below --max-force"),
+        (("--max-force", 5), "nothing feels a force"),
         (("--id", "7"), "the id 7"),
         (("--preset", "nothing"), "nothing"),
         (("--tool", "missing.json"), "missing.json"),
@@ -304,6 +310,45 @@ def test_one_stroke_of_a_batch_is_picked_by_id(batch, tmp_path):
     assert "3 mm off the plane" in refused(batch, "-o", out, "--id", "c", code=2, output=out)
     execute(batch, "-o", out, "--id", "b", "--coupling", "force", "--force-setpoint", 4)
     assert run_of(out).provenance.facts["trajectory"]["normal"] == [0.0, 0.0, 1.0]
+
+
+EXTREME = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from([0.0, -0.0, 5e-324, 1e-300, 1e-9, 1e9, 1e300, -1e300, 1.7e308]),
+)
+NUMBERS = {
+    "--speed": 1,
+    "--period": 1,
+    "--approach": 1,
+    "--start-tolerance": 1,
+    "--workspace": 6,
+    "--max-speed": 1,
+    "--max-acceleration": 1,
+    "--max-jerk": 1,
+    "--max-rotation-speed": 1,
+    "--max-rotation-acceleration": 1,
+    "--max-rotation-jerk": 1,
+    "--following-error": 1,
+    "--max-force": 1,
+    "--force-setpoint": 1,
+}
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("short") / "traj.parquet", columns(duration=2.0))
+
+
+@settings(max_examples=80)
+@given(option=st.sampled_from(sorted(NUMBERS)), data=st.data())
+def test_no_finite_number_ends_in_a_traceback(short, option, data):
+    values = [repr(data.draw(EXTREME)) for _ in range(NUMBERS[option])]
+    if option == "--force-setpoint":
+        values += ["--coupling", "force"]
+    asked = ["execute", str(short), "-o", "-", "--robot", "mock:?x=-550", option, *values]
+    result = CliRunner().invoke(app, asked)
+    assert result.exit_code in (0, 2, 3, 4), result.exception
+    assert isinstance(result.exception, SystemExit | None), result.exception
 
 
 # --- while it runs

@@ -5,14 +5,16 @@ import sys
 import numpy as np
 import pytest
 import typer
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.commands import record
 from dmpcli.drag import enter
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
-from dmpcli.instruments import clock
-from dmpcli.instruments.mock import PEN
-from dmpcli.records import tool
+from dmpcli.instruments import clock, urls
+from dmpcli.instruments.mock import PEN, MockServo
+from dmpcli.records import streams, tool
 from dmpcli.records.record import decode
 from dmpcli.records.schemas import DEMONSTRATION
 from dmpcli.records.streams import Source, read
@@ -218,12 +220,115 @@ def test_nobody_presses_enter_where_no_person_sits():
 
 def test_a_real_recording_is_replaced_by_force_only(tmp_path):
     out = tmp_path / "demo.parquet"
-    record.check_output(str(out), simulated=False, force=False)
+    record.check_output(str(out), repeatable=False, force=False)
     out.write_bytes(b"real")
-    record.check_output(str(out), simulated=True, force=False)
-    record.check_output(str(out), simulated=False, force=True)
+    record.check_output(str(out), repeatable=True, force=False)
+    record.check_output(str(out), repeatable=False, force=True)
     with pytest.raises(InputError, match="--force"):
-        record.check_output(str(out), simulated=False, force=False)
+        record.check_output(str(out), repeatable=False, force=False)
+
+
+@pytest.fixture
+def half_real(monkeypatch):
+    """A mock lab that passes for a mock robot with a real sensor."""
+    connect = urls.connect
+    addresses = urls.parse("mock:", "robot"), urls.parse("netft://10.0.0.7", "sensor")
+    monkeypatch.setattr(urls, "check", lambda *_: addresses)
+
+    def pretend(robot, sensor, clock, **options):
+        monkeypatch.undo()
+        return connect("mock:", "mock:", clock, **options)
+
+    monkeypatch.setattr(urls, "connect", pretend)
+    monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
+    return ("--sensor", "netft://10.0.0.7", "--allow-mixed", "--duration", 2)
+
+
+def test_a_real_sensor_without_its_tool_is_refused(tmp_path, half_real):
+    with pytest.raises(InputError, match="--tool FILE"):
+        run("-o", tmp_path / "demo.parquet", *half_real)
+
+
+def test_a_recording_with_a_real_instrument_is_not_replaced_unasked(tmp_path, half_real):
+    pen, out = tmp_path / "pen.json", tmp_path / "demo.parquet"
+    pen.write_bytes(tool.encode(PEN))
+    out.write_bytes(b"real")
+    with pytest.raises(InputError, match="--force"):
+        run("-o", out, *half_real, "--tool", pen)
+    assert out.read_bytes() == b"real"
+
+
+def test_a_real_instrument_is_paced_by_the_real_clock_and_named_by_its_scheme(tmp_path, half_real):
+    pen, out = tmp_path / "pen.json", tmp_path / "demo.parquet"
+    pen.write_bytes(tool.encode(PEN))
+    run("-o", out, *half_real, "--tool", pen)
+    provenance = demonstration(out).provenance
+    assert provenance.options["sensor"] == "netft"
+    assert provenance.options["realtime"] is True
+    assert "10.0.0.7" not in repr(provenance)
+
+
+def test_a_second_signal_while_the_file_is_written_does_not_lose_it(tmp_path, monkeypatch):
+    class Signalling(clock.SimulatedClock):
+        def sleep_until(self, t):
+            super().sleep_until(t)
+            if 2.999 < t < 3.001:
+                signal.raise_signal(signal.SIGINT)
+
+    write = streams.write
+
+    def interrupted(output, content):
+        signal.raise_signal(signal.SIGINT)
+        write(output, content)
+
+    monkeypatch.setattr(clock, "SimulatedClock", Signalling)
+    monkeypatch.setattr(streams, "write", interrupted)
+    out = tmp_path / "demo.parquet"
+    assert run("-o", out).exit_code == 130
+    assert demonstration(out).t[-1] == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_defect_keeps_the_recording_and_its_traceback(tmp_path, monkeypatch):
+    read = MockServo.state
+
+    def broken(servo):
+        state = read(servo)
+        return 1 / 0 if state.t > 3.0 else state
+
+    monkeypatch.setattr(MockServo, "state", broken)
+    out = tmp_path / "demo.parquet"
+    with pytest.raises(ZeroDivisionError):
+        run("-o", out)
+    assert demonstration(out).provenance.facts["ended"] == "a defect of dmpcli"
+
+
+EXTREME = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from([0.0, -0.0, 5e-324, 1e-300, 1e-9, 1e9, 1e300, -1e300, 1.7e308]),
+)
+NUMBERS = {
+    "--duration": 1,
+    "--until-rest": 1,
+    "--start": 3,
+    "--goal": 3,
+    "--wave-height": 1,
+    "--periods": 1,
+    "--following-error": 1,
+    "--workspace": 6,
+}
+
+
+@settings(max_examples=60)
+@given(st.sampled_from(sorted(NUMBERS)), st.data())
+def test_no_finite_number_ends_in_a_traceback(option, data):
+    """Also without an hour of simulation: what passes lasts seconds."""
+    values = [data.draw(EXTREME) for _ in range(NUMBERS[option])]
+    length = [] if option == "--duration" and values[0] > 20 else ["--duration", 2]
+    assume(option != "--duration" or not 20 < values[0] <= 3600)
+    try:
+        run("-o", "-", "-q", *length, f"{option}", *(repr(v) for v in values))
+    except DmpError as error:
+        assert str(error).count("\n") <= 1
 
 
 def test_every_mistake_has_one_of_the_exit_codes():

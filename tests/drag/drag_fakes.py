@@ -72,8 +72,8 @@ class FakeSensor:
 class FakeServo:
     """Reaches each set-point at once."""
 
-    def __init__(self, clock):
-        self.clock = clock
+    def __init__(self, clock, lookahead=0.2):
+        self.clock, self.lookahead = clock, lookahead
         self.position, self.rotation = np.zeros(3), PEN_DOWN
         self.mode = "ready"
         self.accepts = lambda t: True
@@ -82,7 +82,7 @@ class FakeServo:
 
     def open(self):
         self.calls.append("open")
-        return ServoInfo("fake", (0.002, 0.1), 0.0)
+        return ServoInfo("fake", (0.002, 0.1), self.lookahead)
 
     def state(self):
         mode = self.mode(self.clock.now()) if callable(self.mode) else self.mode

@@ -1,3 +1,4 @@
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 from dmpcli.drag.loop import Recorder
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
+from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.mock import PEN
 from tests.drag.drag_fakes import FakeSensor, FakeServo, drag_settings
 
@@ -16,10 +18,14 @@ PULL = np.array([5.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 BEGAN = 0.1
 
 
-def bench(longest=2.0, asked_to_end=lambda: False, tool=WEIGHTLESS, clock=None, **options):
+def bench(
+    longest=2.0, asked_to_end=lambda: False, tool=WEIGHTLESS, clock=None, signals=None, **options
+):
     clock = clock or SimulatedClock()
     sensor, servo = FakeSensor(clock), FakeServo(clock)
-    recorder = Recorder(servo, sensor, clock, tool, drag_settings(**options), longest, asked_to_end)
+    recorder = Recorder(
+        servo, sensor, clock, tool, drag_settings(**options), longest, signals, asked_to_end
+    )
     return recorder, sensor, servo
 
 
@@ -195,6 +201,177 @@ def test_a_late_loop_skips_cycles_and_never_sends_a_burst():
     ending = recorder.run()
     assert ending.missed == 3
     assert np.diff([t for t, _ in servo.sent]).min() > 0.009
+
+
+def test_a_loop_that_is_late_by_more_than_half_the_look_ahead_stops():
+    class Oversleeping(SimulatedClock):
+        def sleep_until(self, t):
+            super().sleep_until(t + (0.11 if 1.01 < t < 1.03 else 0.0))
+
+    recorder, _, servo = bench(longest=2.0, clock=Oversleeping())
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert "110 ms late" in ending.reason
+    assert servo.sent[-1][0] < 1.01
+    assert servo.calls[-2:] == ["stop", "close"]
+
+
+def test_a_cycle_that_computes_too_long_counts_as_late():
+    recorder, _, servo = bench(longest=2.0)
+    read = servo.state
+
+    def slow():
+        if 1.01 < recorder._clock.now() < 1.03:
+            recorder._clock.sleep_until(1.2)
+        return read()
+
+    servo.state = slow
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert "late" in ending.reason
+
+
+def test_a_stale_sensor_zeroes_the_force_that_is_believed():
+    """The pull goes on, but nobody has said so for three cycles."""
+    recorder, sensor, _ = bench(longest=2.0)
+    sensor.wrench = lambda t: PULL
+    sensor.silent = lambda t: 1.0 < t < 1.085
+    assert recorder.run().reason == "duration"
+    columns = recorder.log.columns()
+    t, fx, speed = BEGAN + columns["t"], columns["fx"], np.gradient(columns["x_ref"]) / 0.02
+    stale = (t > 1.045) & (t < 1.085)
+    assert stale.sum() == 2
+    np.testing.assert_array_equal(fx[stale], 0.0)
+    assert (fx[~stale & (t > 0.5)] > 3.5).all()
+    assert speed[stale][-1] < speed[t < 1.0].max()
+
+
+@pytest.mark.parametrize("signals_sent", [1, 2])
+def test_a_signal_brakes_and_a_second_one_stops_at_once(signals_sent):
+    signals = Interruption()
+    recorder, sensor, servo = bench(longest=np.inf, signals=signals, acceleration=200.0)
+    sensor.wrench = lambda t: 4 * PULL
+    read = servo.state
+
+    def state():
+        if servo.clock.now() > 1.0 and not signals.count:
+            for _ in range(signals_sent):
+                signals.receive(signal.SIGINT)
+        return read()
+
+    servo.state = state
+    ending = recorder.run()
+    assert (ending.reason, ending.failure) == ("asked", None)
+    assert len(recorder.log) == 47
+    braking = [t for t, _ in servo.sent if t > 1.03]
+    assert (len(braking) > 10) == (signals_sent == 1)
+    assert servo.calls[-2:] == ["stop", "close"]
+
+
+def test_a_signal_before_the_motion_lets_none_begin():
+    signals = Interruption()
+    signals.receive(signal.SIGTERM)
+    recorder, _, servo = bench(signals=signals)
+    assert recorder.run().reason == "asked"
+    assert "start" not in servo.calls
+    assert not servo.sent
+
+
+@pytest.mark.parametrize("deed", ["stop", "close"])
+def test_an_arm_that_cannot_be_left_is_a_failure_with_its_recording(deed):
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    recorder, sensor, servo = bench()
+    setattr(servo, deed, unreachable)
+    ending = recorder.run()
+    assert ending.reason == "fake: does not answer"
+    assert isinstance(ending.failure, InstrumentError)
+    assert len(recorder.log) == 101
+    assert sensor.closed == 1
+
+
+def test_the_first_failure_is_the_one_told():
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    recorder, _, servo = bench()
+    servo.stop = servo.close = unreachable
+    servo.mode = lambda t: "ready" if t < 1.0 else "emergency stop"
+    assert "emergency stop" in recorder.run().reason
+
+
+def test_a_defect_is_raised_but_the_arm_is_stopped_and_the_log_kept():
+    recorder, sensor, servo = bench()
+    servo.mode = lambda t: "ready" if t < 1.0 else 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        recorder.run()
+    assert servo.calls[-2:] == ["stop", "close"]
+    assert sensor.closed == 1
+    assert len(recorder.log) == 45
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_wrench_that_is_not_a_number_stops(value):
+    recorder, sensor, servo = bench()
+    sensor.wrench = lambda t: np.full(6, value) if t > 1.0 else PULL
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert np.isfinite([p for _, p in servo.sent]).all()
+    assert servo.sent[-1][0] <= 1.02
+
+
+@pytest.mark.parametrize("attribute", ["position", "rotation"])
+def test_a_pose_that_is_not_a_number_stops(attribute):
+    recorder, _, servo = bench()
+    read = servo.state
+
+    def state():
+        if servo.clock.now() > 1.0:
+            setattr(servo, attribute, np.full_like(getattr(servo, attribute), np.nan))
+        return read()
+
+    servo.state = state
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert "not a number" in ending.reason
+    assert np.isfinite([p for _, p in servo.sent]).all()
+
+
+def test_the_reference_does_not_run_away_from_an_arm_that_is_blocked():
+    recorder, sensor, servo = bench(longest=5.0, following_error=4.0)
+    sensor.wrench = lambda t: PULL
+    accept = servo.send
+
+    def blocked(position, rotation):
+        here = servo.position
+        taken = accept(position, rotation)
+        servo.position = here if servo.clock.now() > 1.0 else position
+        return taken
+
+    servo.send = blocked
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert "following error" in ending.reason
+    # At 50 mm/s the reference gains 1 mm a cycle; the trail reaches back 0.3 s, 15 mm.
+    assert np.linalg.norm(servo.sent[-1][1] - servo.position) < 4.0 + 15.0 + 2.0
+
+
+def test_the_tool_is_not_led_out_of_the_workspace():
+    box = (-100.0, 20.0, -100.0, 100.0, -100.0, 100.0)
+    recorder, sensor, servo = bench(longest=9.0, workspace=box)
+    sensor.wrench = lambda t: PULL
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert "workspace" in ending.reason
+    assert 18.0 < max(p[0] for _, p in servo.sent) <= 20.0
+
+
+def test_a_tool_outside_the_workspace_is_not_started():
+    recorder, _, servo = bench(workspace=(1.0, 2.0, -9.0, 9.0, -9.0, 9.0))
+    with pytest.raises(RefusedError, match="workspace"):
+        recorder.run()
+    assert not servo.sent
 
 
 def test_a_robot_without_drag_teaching_cannot_be_dragged_by_its_own():

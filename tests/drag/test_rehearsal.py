@@ -103,6 +103,14 @@ def test_a_pen_far_from_the_stroke_is_not_tugged_there():
         rehearse(robot="mock:?x=-500")
 
 
+def test_the_built_in_drag_stays_in_the_workspace_too():
+    box = (-600.0, -500.0, 0.0, 300.0, -100.0, 100.0)
+    _, recorder, ending = rehearse(drag="builtin", workspace=box)
+    assert isinstance(ending.failure, RefusedError)
+    assert "the tool at x" in ending.reason
+    assert positions(recorder)[1][:, 0].min() >= -600.0
+
+
 class Press:
     """A hand that presses the pen into the plate with one force, from the beginning on."""
 

@@ -58,10 +58,13 @@ def run(planned, lag=3, late=()):
     actual = np.vstack([np.repeat(plan[:1], lag, axis=0), plan[: len(plan) - lag]])
     n = len(plan)
     t = np.arange(n) * 0.02
-    lateness = np.full(n, 1e-4)
+    deadline, lateness = t.copy(), np.full(n, 1e-4)
     for i in late:
+        # The loop was still late at the next deadline, which then passed without a set-point.
         lateness[i] = 0.03
-    columns = {"t": t, "t_plan": np.clip(t - 0.1, 0, None), "deadline": t, "lateness": lateness}
+        deadline[i + 1 :] += 0.02
+    columns = {"t": t, "t_plan": np.clip(t - 0.1, 0, None)}
+    columns |= {"deadline": deadline, "lateness": lateness}
     for suffix, values in (("plan", plan), ("sent", plan)):
         columns |= dict(zip(suffixed(POSITION, suffix), values.T, strict=True))
     columns |= dict(zip(POSITION, actual.T, strict=True))

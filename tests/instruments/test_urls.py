@@ -55,7 +55,9 @@ def test_there_need_not_be_a_plate():
         ("mock:?x=near", "robot", "x = 'near': a finite number"),
         ("mock:?x=nan", "robot", "finite"),
         ("mock:?x=1&x=2", "robot", "x: is given twice"),
-        ("mock:?stiffness=0", "robot", "stiffness = 0: must be above 0"),
+        ("mock:?stiffness=0", "robot", "stiffness = 0: must be 1e-06 or more"),
+        ("mock:?x=1e300", "robot", "x = 1e300: must lie within"),
+        ("mock:?lag=11", "robot", "lag = 11: must lie within ±10"),
         ("mock:?lag=-1", "robot", "lag = -1: must not be negative"),
         ("mock:?seed=1.5", "sensor", "whole number"),
         ("mock:?stiffness=none", "robot", "finite number"),
@@ -100,3 +102,23 @@ def test_two_urls_that_disagree_on_the_one_lab_are_refused():
     assert lab("mock:?seed=1", "mock:?seed=1").scene.seed == 1
     with pytest.raises(InputError, match="seed differs"):
         lab("mock:?seed=1", "mock:?seed=2")
+
+
+def test_a_file_keeps_all_of_a_mocks_url_and_of_a_real_one_the_scheme_alone():
+    assert urls.in_provenance("mock:?plate=-17.5") == "mock:?plate=-17.5"
+    assert urls.in_provenance("netft://ft-7.plant.example/x") == "netft"
+    assert urls.in_provenance(None) is None
+
+
+def test_one_real_instrument_makes_a_run_unrepeatable():
+    mock, real = urls.parse("mock:", "robot"), urls.parse("netft://h", "sensor")
+    assert urls.repeatable([mock, urls.parse("mock:", "sensor")])
+    assert not urls.repeatable([mock, real])
+
+
+def test_a_real_sensor_needs_its_tool():
+    real = urls.parse("netft://h", "sensor")
+    urls.need_tool(real, given=True)
+    urls.need_tool(urls.parse("mock:", "sensor"), given=False)
+    with pytest.raises(InputError, match="--tool FILE"):
+        urls.need_tool(real, given=False)

@@ -11,16 +11,15 @@ from tests.human_strokes import shapes, strokes
 
 @pytest.mark.parametrize("shape", shapes())
 def test_fit_generalize_report(dmpcli, tmp_path, shape):
-    for i, stroke in enumerate(strokes(shape)[:2]):
-        frame = pd.DataFrame(np.column_stack([stroke.t, stroke.position]), columns=list("txyz"))
-        frame.to_csv(tmp_path / f"{i}.csv", index=False, sep=", "[i])
-    skill = dmpcli("fit", "0.csv", "1.csv", "-o", "-").stdout
-    (tmp_path / "skill.json").write_bytes(skill)
-    start, goal = ["100", "-200", "5"], ["160", "-170", "5"]
-    drawn = dmpcli("generalize", "-", "-o", "-", "--start", *start, "--goal", *goal, stdin=skill)
-    report = dmpcli("report", "skill.json", "-", "--json", stdin=drawn.stdout).stdout
-    assert json.loads(report)["schema"] == "report"
-    document = json.loads(skill)
-    sizes = [np.linalg.norm(np.ptp(s.position, axis=0)) for s in strokes(shape)[:2]]
-    # Two people's strokes are averaged by one skill; each alone is bounded in test_primitives.
-    assert document["reproduction"][0]["rms"] < 0.35 * max(sizes)
+    one = strokes(shape)[0]
+    frame = pd.DataFrame(np.column_stack([one.t, one.position]), columns=list("txyz"))
+    frame.to_csv(tmp_path / "demo.csv", index=False, sep=" ")
+    skill = dmpcli("fit", "demo.csv", "-o", "-", "--no-trim").stdout
+    drawn = dmpcli("generalize", "-", "-o", "-", "--reproduce", stdin=skill).stdout
+    report = dmpcli("report", "demo.csv", "-", "--json", stdin=drawn).stdout
+    demonstrated, stroke = (file["strokes"][0] for file in json.loads(report)["files"])
+    size = np.linalg.norm(np.ptp(one.position, axis=0))
+    # At 50 Hz; the report prepares the demonstration anew, trimmed and smoothed.
+    assert stroke["deviation"]["nearest_rms"] < 0.005 * size
+    assert stroke["length"] == pytest.approx(demonstrated["length"], rel=0.02)
+    assert stroke["goal_error"] < 0.005 * size

@@ -156,3 +156,65 @@ def test_every_command_refuses_what_is_no_input_in_a_line_or_two(
     assert "input" in said
     assert len(said.strip().splitlines()) <= 2
     assert [p.name for p in tmp_path.iterdir()] == ["input"]
+
+
+@pytest.mark.parametrize(
+    "command", ["fit demo -o -", "inspect demo", "report demo", "record -o - --duration 2"]
+)
+def test_a_full_or_closed_standard_output_is_one_line_and_a_lost_reader_is_sigpipe(
+    tmp_path, command
+):
+    (tmp_path / "demo").write_bytes(REFERENCE.read_bytes())
+    for redirection in ("> /dev/full", ">&-"):
+        done = shell(
+            f"dmpcli {command} -q {redirection}".replace("inspect demo -q", "inspect demo"),
+            tmp_path,
+        )
+        said = done.stderr.decode()
+        assert done.returncode == 2, said
+        assert said.startswith("dmpcli: standard output: ")
+        assert len(said.strip().splitlines()) == 1
+    lost = shell(f"dmpcli {command} | true; exit ${{PIPESTATUS[0]}}", tmp_path)
+    assert lost.returncode in (0, 141)
+    assert b"Traceback" not in lost.stderr
+    assert b"Exception" not in lost.stderr
+
+
+def test_a_closed_standard_input_is_one_line(tmp_path):
+    done = shell("dmpcli fit - -o skill.json <&-", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.decode() == "dmpcli: standard input: is closed; name a file\n"
+
+
+def test_sigterm_during_a_batch_leaves_the_older_one_whole(dmpcli, tmp_path):
+    dmpcli("fit", REFERENCE, "-o", "skill.json")
+    rows = [f"0,0,0,100,{i % 9},0" for i in range(30_000)]
+    (tmp_path / "few.csv").write_text("\n".join(["x0,y0,z0,xg,yg,zg", *rows[:3]]))
+    (tmp_path / "many.csv").write_text("\n".join(["x0,y0,z0,xg,yg,zg", *rows]))
+    dmpcli("generalize", "skill.json", "-o", "batch", "--pairs", "few.csv")
+    before = {p.name: p.read_bytes() for p in (tmp_path / "batch").iterdir()}
+    arguments = "generalize skill.json -o batch --pairs many.csv"
+    done = shell(f"timeout -s TERM 3 {DMPCLI} {arguments}", tmp_path)
+    assert done.returncode == 124  # as timeout says it
+    assert {p.name: p.read_bytes() for p in (tmp_path / "batch").iterdir()} == before
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == {"skill.json", "few.csv", "many.csv", "batch"}
+
+
+def test_a_skill_that_is_not_the_stroke_is_said_so_even_when_quiet(dmpcli):
+    said = dmpcli("fit", REFERENCE, "-o", "s.json", "--cutoff", "0.02", "-q").stderr.decode()
+    assert "smoothing took off much of the stroke" in said
+    assert dmpcli("fit", REFERENCE, "-o", "s.json", "-q").stderr == b""
+
+
+def test_a_report_leaves_no_figures_of_an_older_one(dmpcli, tmp_path):
+    dmpcli("fit", REFERENCE, "-o", "s.json")
+    dmpcli("generalize", "s.json", "-o", "1.parquet", "--reproduce")
+    dmpcli("generalize", "s.json", "-o", "2.parquet", *PAIR)
+    dmpcli("report", REFERENCE, "1.parquet", "-o", "out")
+    dmpcli("report", REFERENCE, "2.parquet", "-o", "out")
+    names = {p.name[:4] for p in (tmp_path / "out").glob("fig*")}
+    assert {"fig7", "fig8"} <= names
+    assert not {"fig5", "fig6"} & names
+    dmpcli("report", "none.parquet", "-o", "never", code=2)
+    assert not (tmp_path / "never").exists()

@@ -8,6 +8,7 @@ from dmpcli.primitives.drawing import Style, draw
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.preparation import Choices
+from dmpcli.primitives.smoothing import Stroke
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
 
@@ -61,10 +62,32 @@ def test_new_pairs_keep_the_shape(shape):
 def test_the_set_holds_what_the_promise_is_about():
     everything = [stroke for shape in shapes() for stroke in strokes(shape)]
     assert len(everything) == 210
-    swinging = 0
+    swinging, moving = 0, 0
     for stroke in everything:
         offsets = stroke.position - stroke.position[0]
         u = offsets[-1] / np.linalg.norm(offsets[-1])
         along = offsets @ u / np.linalg.norm(offsets[-1])
         swinging += bool(along.min() < -0.05 or along.max() > 1.05)
-    assert swinging >= 50
+        first = np.linalg.norm(stroke.position[1] - stroke.position[0]) / stroke.t[1]
+        mean = np.linalg.norm(np.diff(stroke.position, axis=0), axis=1).sum() / stroke.t[-1]
+        moving += bool(first > 0.05 * mean)
+    assert swinging >= 60
+    assert moving >= 80
+
+
+@pytest.mark.parametrize("shape", shapes())
+def test_strokes_that_end_where_they_began_keep_their_shape_and_reach_their_goal(shape):
+    """Each stroke and its way back: closed, and beyond its own ends."""
+    for stroke in strokes(shape)[:3]:
+        back = stroke.position[-2::-1]
+        there_and_back = Stroke(
+            np.linspace(0.0, 2.0 * stroke.duration, 2 * len(stroke.t) - 1),
+            np.concatenate([stroke.position, back]),
+        )
+        skill = fit([there_and_back], Choices()).skill
+        assert skill.closed
+        size = extent(stroke.position)
+        drawn = draw_at(skill, [10, 20, 5], [10, 20, 5])
+        moved = there_and_back.position - there_and_back.position[0] + [10, 20, 5]
+        assert nearest_rms(drawn.position, moved) < 0.02 * size
+        assert np.linalg.norm(drawn.position[-1] - [10, 20, 5]) < 0.01 * size

@@ -114,9 +114,25 @@ NUMBERS = {"t": [0.0, 1.0], "x": [0.0, 1.0], "y": [0.0, 1.0], "z": [0.0, 1.0]}
         (with_header(NUMBERS | {"y": [0.0, float("nan")]}), "column 'y', row 2: nan is not"),
         (with_header({k: pa.array([], pa.float64()) for k in NUMBERS}), "holds no rows"),
         (with_header(NUMBERS).replace_schema_metadata({"dmpcli": "{"}), "metadata are damaged"),
+        (with_header(NUMBERS, version=True), "metadata are damaged"),
+        (with_header(NUMBERS, options=[]), "metadata are damaged"),
+        (with_header(NUMBERS, inputs=3), "metadata are damaged"),
+        (with_header(NUMBERS, facts=[1]), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"normal": [0, 1]}), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"start": "x"}), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"tau": "soon"}), "metadata are damaged"),
     ],
 )
 def test_what_is_wrong_is_named_with_column_and_row(table, message):
     with pytest.raises(InputError, match=message) as caught:
         record.decode(table_source(table), schemas.DEMONSTRATION)
     assert str(caught.value).startswith("bad.parquet")
+
+
+def test_parts_that_are_not_ours_are_found_in_a_folder(tmp_path):
+    (tmp_path / "part-00000.parquet").write_bytes(record.encode(demonstration()))
+    assert record.foreign_parts(tmp_path) == []
+    pq.write_table(pa.table(NUMBERS), tmp_path / "part-00001.parquet")
+    (tmp_path / "pairs.parquet").write_bytes(b"notes")
+    (tmp_path / "other.txt").write_bytes(b"notes")
+    assert record.foreign_parts(tmp_path) == ["pairs.parquet", "part-00001.parquet"]

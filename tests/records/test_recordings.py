@@ -115,6 +115,13 @@ def edited(row, column, text, name="log.csv"):
         (csv(values=np.empty((0, 4))), "holds no rows"),
         (Source("log.csv", b"# only a comment\n"), "holds no rows"),
         (Source("log.csv", b"\x00\xff\xfe"), "neither a Parquet file nor text"),
+        (csv(header="t x x y z", values=np.column_stack([T, T, XYZ])), "column 'x' is there twice"),
+        (Source("log.csv", b' {"schema": "skill"}'), "is JSON, not a recording"),
+        (
+            csv(header="t x y z rx ry rz", values=np.column_stack([T, XYZ, 180 + 0 * XYZ])),
+            "line 2: an angle of 180 rad; check the unit of angle",
+        ),
+        (csv(values=np.column_stack([T * 1e300, XYZ])), "check the unit of time"),
         (csv(header="t x y z rx", values=np.column_stack([T, XYZ, T])), "'ry' is missing"),
     ],
 )

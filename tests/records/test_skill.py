@@ -83,6 +83,9 @@ def changed(**changes):
         (changed(tau=-1.0), "tau: "),
         (changed(d=[0.0] * 6), "k, d and widths must be positive"),
         (changed(extra=1), "extra: "),
+        (changed(version=None), "version: Field required"),
+        (changed(version=True), "version: "),
+        (changed(forcing_scale="axis"), "forcing_scale belongs to the original model"),
         (changed(tau=float("nan")), "tau: "),
     ],
 )

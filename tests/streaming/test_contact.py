@@ -126,6 +126,13 @@ def test_it_gives_up_where_the_force_never_settles():
     assert "does not settle" in press.given_up
 
 
+def test_it_gives_up_in_the_end_however_slow_it_is():
+    press = pressing(clamp=1e6)
+    for _ in range(round(61 / PERIOD)):
+        press.displace(0.0, push(UP, 2.0))
+    assert "does not settle" in press.given_up
+
+
 def test_a_plan_that_lifts_off_releases_e():
     """Faster along the normal than the coupling could follow, 5 N / 2 N·s/mm = 2.5 mm/s."""
     rising = stroke(normal=(-0.8, 0.0, 0.6))  # the stroke runs towards -x, up to 20 mm/s

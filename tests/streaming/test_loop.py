@@ -7,12 +7,15 @@ from streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, plan, s
 
 from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.interruption import Interruption
+from dmpcli.instruments.protocols import Sample, SensorInfo
+from dmpcli.instruments.sensing import Sensing
+from dmpcli.primitives import admittance
+from dmpcli.primitives.coupling import Law, fast_filter
 from dmpcli.rotations import exp
+from dmpcli.streaming.contact import Pressing, Touch
 from dmpcli.streaming.loop import DONE, Arm, Loop, Watch
 
 WATCH = Watch(5.0, 0.1, 50.0)
-
-
 PERIOD = 0.02
 # Of what the loop itself watches, the test's touch feels nothing.
 NOTHING = np.zeros(6)
