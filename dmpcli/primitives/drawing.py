@@ -93,7 +93,8 @@ def draw(
     duration : array, shape (B,)
         Of each stroke without easing, s.
     surface : Surface or None
-        What to draw on; a plane's normal is on the tool's side. Without one each pair has its own plane, parallel to the demonstration's.
+        What to draw on; a plane's normal is on the tool's side. Without one each pair has its own
+        plane, parallel to the demonstration's.
     style : Style
 
     Returns
