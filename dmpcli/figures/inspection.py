@@ -14,7 +14,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.figures import tables
 from dmpcli.figures.measured import Row
-from dmpcli.records import plane, pose, record, recordings, schemas, skill, tool
+from dmpcli.records import documents, plane, pose, record, recordings, schemas, skill, tool
 from dmpcli.records import tables as records_tables
 from dmpcli.records.streams import Source
 
@@ -132,7 +132,7 @@ def _timing(found: record.Record) -> Row:
 
 
 def _json(source: Source) -> Row:
-    content = skill.json_document(source)
+    content = documents.json_document(source)
     name, version = content.get("schema"), content.get("version")
     if not isinstance(name, str):
         name = None

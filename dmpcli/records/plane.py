@@ -3,21 +3,21 @@
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from dmpcli.errors import InputError
+from dmpcli.records import documents
+from dmpcli.records.documents import Part
 from dmpcli.records.pairs import FARTHEST
-from dmpcli.records.skill import json_document
 from dmpcli.records.streams import Source
 from dmpcli.surfaces.plane import Plane
 
+SCHEMA = "plane"
 VERSION = 1
 
 
-class PlaneFile(BaseModel):
+class PlaneFile(Part):
     """A plane in the robot's base frame."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     schema_name: Annotated[Literal["plane"], Field(alias="schema")] = "plane"
     version: Annotated[int, Field(ge=1)] = VERSION
@@ -36,22 +36,8 @@ def decode(source: Source) -> Plane:
     InputError
         Not JSON, another schema, a newer version, or not a point and a normal.
     """
-    document = json_document(source)
-    version = document.get("version", VERSION)
-    if isinstance(version, int) and version > VERSION:
-        raise InputError(
-            f"{source.name}: plane version {version} is newer than this program's ({VERSION}); "
-            "upgrade dmpcli"
-        )
-    try:
-        file = PlaneFile.model_validate(document)
-    except ValidationError as error:
-        detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"]) or "document"
-        raise InputError(
-            f"{source.name}: {where}: {detail['msg']}; a plane is "
-            '{"point": [x, y, z], "normal": [nx, ny, nz]} in mm'
-        ) from None
+    remedy = 'a plane is {"point": [x, y, z], "normal": [nx, ny, nz]} in mm'
+    file = documents.validated(source, PlaneFile, SCHEMA, VERSION, remedy, by_hand=True)
     normal, point = np.array(file.normal), np.array(file.point)
     if np.abs(point).max() > FARTHEST:
         raise InputError(f"{source.name}: point: is beyond {FARTHEST:g} mm; check its unit")
@@ -64,7 +50,4 @@ def decode(source: Source) -> Plane:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of plane files."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dmpcli plane",
-    } | PlaneFile.model_json_schema(by_alias=True)
+    return documents.json_schema(PlaneFile, SCHEMA)

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from dmpcli import __version__, rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
-from dmpcli.records import streams
+from dmpcli.records import documents, streams
+from dmpcli.records.documents import Part
 from dmpcli.records.schemas import EULER, FRAME
-from dmpcli.records.skill import json_document
 from dmpcli.records.streams import Source
 
 SCHEMA = "pose"
@@ -48,11 +48,7 @@ class Pose:
         return moved
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Residuals(_Part):
+class Residuals(Part):
     """Distances that the fit leaves, mm."""
 
     points: Annotated[int, Field(ge=0)]
@@ -60,7 +56,7 @@ class Residuals(_Part):
     largest: Distance
 
 
-class Conditioning(_Part):
+class Conditioning(Part):
     """How well the touched points hold the part, see docs/registration.md."""
 
     number: Annotated[float, Field(ge=1, description="largest gain over smallest")]
@@ -73,7 +69,7 @@ class Conditioning(_Part):
     ]
 
 
-class PoseFile(_Part):
+class PoseFile(Part):
     """Where a part lies in the robot's base frame."""
 
     schema_name: Annotated[Literal["pose"], Field(alias="schema")] = "pose"
@@ -85,8 +81,8 @@ class PoseFile(_Part):
     rotation: Annotated[Three, Field(description=f"Euler angles, {EULER}, rad")]
     residuals: Residuals | None = None
     conditioning: Conditioning | None = None
-    options: dict[str, Any] = {}
-    inputs: list[dict[str, str]] = []
+    options: dict[str, Any] = Field(default_factory=dict)
+    inputs: list[dict[str, str]] = Field(default_factory=list)
 
 
 def encode(
@@ -117,26 +113,8 @@ def decode(source: Source) -> tuple[Pose, PoseFile]:
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    document = json_document(source)
-    if document.get("schema", SCHEMA) != SCHEMA:
-        raise InputError(
-            f"{source.name}: has schema {document.get('schema')!r}, a pose file is needed"
-        )
-    version = document.get("version", VERSION)
-    if isinstance(version, int) and version > VERSION:
-        raise InputError(
-            f"{source.name}: pose version {version} is newer than this program's ({VERSION}); "
-            "upgrade dmpcli"
-        )
-    try:
-        file = PoseFile.model_validate(document)
-    except ValidationError as error:
-        detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"]) or "document"
-        raise InputError(
-            f"{source.name}: {where}: {detail['msg']}; a pose is "
-            '{"position": [x, y, z], "rotation": [rx, ry, rz]} in mm and rad'
-        ) from None
+    remedy = 'a pose is {"position": [x, y, z], "rotation": [rx, ry, rz]} in mm and rad'
+    file = documents.validated(source, PoseFile, SCHEMA, VERSION, remedy, by_hand=True)
     return Pose.of(np.array([*file.position, *file.rotation])), file
 
 
@@ -185,7 +163,4 @@ def _number(word: str) -> float | None:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of pose files."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dmpcli pose",
-    } | PoseFile.model_json_schema(by_alias=True)
+    return documents.json_schema(PoseFile, SCHEMA)

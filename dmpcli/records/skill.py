@@ -7,14 +7,15 @@ import json
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.phase import Basis
 from dmpcli.primitives.skill import Skill, TaskFrame
+from dmpcli.records import documents
+from dmpcli.records.documents import Part
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import EULER, FRAME
 from dmpcli.records.streams import Source
@@ -28,17 +29,7 @@ Positive = Annotated[float, Field(gt=0)]
 Weights = Annotated[list[float], Field(min_length=1)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid",
-        frozen=True,
-        allow_inf_nan=False,
-        validate_by_name=True,
-        validate_by_alias=True,
-    )
-
-
-class Frame(_Part):
+class Frame(Part):
     """Where and how the stroke was demonstrated, in the base frame."""
 
     start: Annotated[Three, Field(description="mm")]
@@ -53,7 +44,7 @@ class Frame(_Part):
     ]
 
 
-class Reproduction(_Part):
+class Reproduction(Part):
     """How well the skill gives back one demonstration, in mm."""
 
     sha256: str
@@ -64,7 +55,7 @@ class Reproduction(_Part):
     smoothing: Annotated[float, Field(ge=0, description="RMS of what smoothing took off")]
 
 
-class SkillFile(_Part):
+class SkillFile(Part):
     """A dynamic movement primitive of six coordinates, learned by dmpcli fit."""
 
     schema_name: Annotated[Literal["skill"], Field(alias="schema")] = SCHEMA
@@ -166,36 +157,8 @@ def decode(source: Source) -> tuple[Skill, SkillFile]:
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    document = json_document(source)
-    if document.get("schema") != SCHEMA:
-        raise InputError(
-            f"{source.name}: has schema {document.get('schema')!r}, a skill of dmpcli fit is needed"
-        )
-    version = document.get("version")
-    if isinstance(version, int) and version > VERSION:
-        raise InputError(
-            f"{source.name}: skill version {version} is newer than this program's ({VERSION}); "
-            "upgrade dmpcli"
-        )
-    try:
-        file = SkillFile.model_validate(document)
-    except ValidationError as error:
-        detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"]) or "document"
-        raise InputError(f"{source.name}: {where}: {detail['msg']}; fit the skill again") from None
+    file = documents.validated(source, SkillFile, SCHEMA, VERSION, "fit the skill again")
     return _skill(file), file
-
-
-def json_document(source: Source) -> dict[str, Any]:
-    """Return the object of a JSON source; InputError where it is not JSON or not an object."""
-    try:
-        document = json.loads(source.content)
-    except (ValueError, RecursionError) as error:
-        reason = str(error) if isinstance(error, json.JSONDecodeError) else "not text"
-        raise InputError(f"{source.name}: is not JSON: {reason}") from None
-    if not isinstance(document, dict):
-        raise InputError(f"{source.name}: is JSON, but not an object")
-    return document
 
 
 def _skill(file: SkillFile) -> Skill:
@@ -244,7 +207,4 @@ def _layout(value: Any, indent: int = 0) -> str:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of skill files."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dmpcli skill",
-    } | SkillFile.model_json_schema(by_alias=True)
+    return documents.json_schema(SkillFile, SCHEMA)

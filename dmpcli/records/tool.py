@@ -4,12 +4,12 @@ import json
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from dmpcli.errors import InputError
 from dmpcli.primitives.wrench import Tool
+from dmpcli.records import documents
+from dmpcli.records.documents import Part
 from dmpcli.records.schemas import EULER
-from dmpcli.records.skill import json_document
 from dmpcli.records.streams import Source
 from dmpcli.rotations import from_euler, to_euler
 
@@ -19,25 +19,23 @@ VERSION = 1
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Transform(_Part):
+class Transform(Part):
     """A frame on the flange."""
 
     position: Annotated[Three, Field(description="in flange axes, mm")]
-    rotation: Annotated[Three, Field(description=f"Euler angles, {EULER}, rad")] = [0.0, 0.0, 0.0]
+    rotation: Annotated[Three, Field(description=f"Euler angles, {EULER}, rad")] = Field(
+        default_factory=lambda: [0.0] * 3
+    )
 
 
-class Zero(_Part):
+class Zero(Part):
     """What the sensor reads with nothing on it."""
 
     force: Annotated[Three, Field(description="N")]
     torque: Annotated[Three, Field(description="N·m")]
 
 
-class Payload(_Part):
+class Payload(Part):
     """What hangs on the sensor."""
 
     weight: Annotated[float, Field(ge=0, description="N")]
@@ -45,13 +43,13 @@ class Payload(_Part):
     inclination: Annotated[
         list[float],
         Field(min_length=2, max_length=2, description="U, V of the robot's base, rad"),
-    ] = [0.0, 0.0]
+    ] = Field(default_factory=lambda: [0.0] * 2)
     zero: Annotated[Zero | None, Field(description="null: taken at rest before each recording")] = (
         None
     )
 
 
-class ToolFile(_Part):
+class ToolFile(Part):
     """A tool on the robot's flange."""
 
     schema_name: Annotated[Literal["tool"], Field(alias="schema")] = "tool"
@@ -90,23 +88,7 @@ def decode(source: Source) -> Tool:
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    document = json_document(source)
-    if document.get("schema") != SCHEMA:
-        raise InputError(
-            f"{source.name}: has schema {document.get('schema')!r}, a tool file is needed"
-        )
-    version = document.get("version")
-    if isinstance(version, int) and version > VERSION:
-        raise InputError(
-            f"{source.name}: tool version {version} is newer than this program's ({VERSION}); "
-            "upgrade dmpcli"
-        )
-    try:
-        file = ToolFile.model_validate(document)
-    except ValidationError as error:
-        detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"]) or "document"
-        raise InputError(f"{source.name}: {where}: {detail['msg']}; mend the file") from None
+    file = documents.validated(source, ToolFile, SCHEMA, VERSION, "mend the file")
     zero = file.payload.zero
     return Tool(
         tcp_position=np.array(file.flange_to_tcp.position),
@@ -122,7 +104,4 @@ def decode(source: Source) -> Tool:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of tool files."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dmpcli tool",
-    } | ToolFile.model_json_schema(by_alias=True)
+    return documents.json_schema(ToolFile, SCHEMA)

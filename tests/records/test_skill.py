@@ -113,7 +113,10 @@ def test_a_plane_is_a_point_and_a_normal_of_any_length():
         (b'{"point": [1, 2, 3], "normal": [0, 0, 0]}', "normal: is zero"),
         (b'{"point": [1, 2], "normal": [0, 0, 1]}', "point: "),
         (b'{"point": [1, 2, 3], "normal": [0, 0, NaN]}', "normal.2: "),
-        (b'{"schema": "skill", "point": [1, 2, 3], "normal": [0, 0, 1]}', "schema: "),
+        (
+            b'{"schema": "skill", "point": [1, 2, 3], "normal": [0, 0, 1]}',
+            "has schema 'skill', a plane",
+        ),
         (b'{"version": 7}', "version 7 is newer"),
     ],
 )
