@@ -114,7 +114,7 @@ def _batch(folder: Path, label: str, normal: "Floats | None") -> "Part":
     from dmpcli.figures.stroke import pairs_of, strokes_of
     from dmpcli.records import record, schemas, streams
 
-    source = streams.read(folder / "pairs.parquet")
+    source = streams.read(folder / streams.TABLE)
     pairs = record.decode(source, schemas.PAIRS)
     known, states = pairs_of(pairs)
     strokes = []

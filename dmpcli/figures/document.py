@@ -12,6 +12,7 @@ from dmpcli import __version__
 from dmpcli.figures import measured, paper_tables, tables
 from dmpcli.figures.measured import Row
 from dmpcli.figures.stroke import Stroke
+from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
 from dmpcli.records.skill import SkillFile
 
@@ -115,8 +116,8 @@ def as_csv(parts: Sequence[Part]) -> bytes:
 
 def _counted(states: Mapping[str, int]) -> str:
     """Say how many pairs were drawn, and of the others how many and one reason."""
-    drawn = states.get("ok", 0)
-    bad = {status: n for status, n in states.items() if status != "ok"}
+    drawn = states.get(OK, 0)
+    bad = {status: n for status, n in states.items() if status != OK}
     if not bad:
         return f"{drawn} drawn"
     return f"{drawn} drawn, {sum(bad.values())} not; the first: {next(iter(bad))}"

@@ -14,7 +14,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.figures import tables
 from dmpcli.figures.measured import Row
-from dmpcli.records import documents, plane, pose, record, recordings, schemas, skill, tool
+from dmpcli.records import documents, plane, pose, publish, record, recordings, schemas, skill, tool
 from dmpcli.records import tables as records_tables
 from dmpcli.records.streams import Source
 
@@ -155,13 +155,6 @@ _READERS: dict[Any, Callable[[Source], object]] = {
     "pose": pose.decode,
 }
 """Their readers name what is wrong with a damaged file."""
-
-_SCHEMAS = {
-    "skill": skill.schema,
-    "plane": plane.schema,
-    "tool": tool.schema,
-    "pose": pose.schema,
-}
 
 _MEANINGS = {
     "skill": "What fit learned of a stroke, all that generalize needs.",
@@ -330,6 +323,6 @@ def json_schema(name: str) -> bytes:
     InputError
         There is none of that name.
     """
-    if name not in _SCHEMAS:
-        raise InputError(f"--schema {name}: no such schema; there are {', '.join(_SCHEMAS)}")
-    return (json.dumps(_SCHEMAS[name](), indent=2, ensure_ascii=False) + "\n").encode()
+    if name not in publish.SCHEMAS:
+        raise InputError(f"--schema {name}: no such schema; there are {', '.join(publish.SCHEMAS)}")
+    return publish.text(name).encode()

@@ -10,11 +10,11 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas, streams
+from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
 from dmpcli.rotations import from_euler
 from dmpcli.streaming.plan import Stroke
 
-PAIRS = "pairs.parquet"
 _NAMED = 5
 
 
@@ -55,17 +55,17 @@ def find(path: str, wanted: str | None) -> Found:
     if path == streams.DASH or not Path(path).is_dir():
         return _in_file(path, wanted, {})
     folder = Path(path)
-    pairs = record.decode(streams.read(folder / PAIRS), schemas.PAIRS)
+    pairs = record.decode(streams.read(folder / streams.TABLE), schemas.PAIRS)
     row = _row_of(pairs, wanted, path)
     name, status = str(pairs.columns["id"][row]), str(pairs.columns["status"][row])
-    if status != "ok" or "part" not in pairs.columns:
+    if status != OK or "part" not in pairs.columns:
         raise InputError(f"{path}: pair {name} has no trajectory: {status}")
     return _in_file(str(folder / str(pairs.columns["part"][row])), name, _pair_facts(pairs, row))
 
 
 def _row_of(pairs: Record, wanted: str | None, path: str) -> int:
     ids = pairs.columns["id"].astype(str)
-    usable = ids[pairs.columns["status"].astype(str) == "ok"]
+    usable = ids[pairs.columns["status"].astype(str) == OK]
     rows = np.flatnonzero(ids == _choose(usable, wanted, path, ids))
     return int(rows[0])
 
