@@ -68,6 +68,9 @@ class MeshCharts:
             outside[smooth] = part.outside
             status[smooth] = np.where(part.sharp, Status.DRAWN, part.status)
             unfolded[smooth[part.sharp]] = True
+            better = smooth[part.slivers & ~part.sharp & (part.status == Status.DRAWN)]
+            if len(better):
+                self._improve(better, coordinates[better], foot, axes)
         creased = np.flatnonzero(unfolded)
         if len(creased):
             foot[creased], axes[creased], outside[creased], status[creased] = self._unfold(
@@ -75,6 +78,16 @@ class MeshCharts:
             )
         position = foot + coordinates[..., 2:] * axes[..., 2]
         return Lift(position, axes, outside, status, unfolded)
+
+    def _improve(self, rows: Integers, coordinates: Floats, foot: Floats, axes: Floats) -> None:
+        """Put the strokes of some pairs where unfolding leads, if it confirms the strip's.
+
+        Where it does not, a cross line met a border or a hole that the strip was carried over.
+        """
+        exact, turned, _, status = self._unfold(rows, coordinates)
+        near = length(exact - foot[rows])[..., 0].max(axis=1) <= self.mesh.reach
+        good = near & (status == Status.DRAWN)
+        foot[rows[good]], axes[rows[good]] = exact[good], turned[good]
 
     def _unfold(
         self, rows: Integers, coordinates: Floats

@@ -12,6 +12,7 @@ from dmpcli.surfaces.vectors import cross, dot, length, unit
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.charts import MeshCharts
+    from dmpcli.surfaces.developable import Developable
 
 # Where facets meet at more than this the edge is meant to be sharp: normals are not smoothed
 # across it, and a strip whose normal turns as much within one step is unfolded instead, degrees.
@@ -85,6 +86,14 @@ class Mesh:
         cosine = dot(self.face_normals[:, None], self.face_normals[across])[..., 0]
         angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
         return np.where(across == -1, 0.0, np.where(across == -2, 180.0, angle))
+
+    @cached_property
+    def developable(self) -> "Developable":
+        """Slivers that are to be unfolded; see `developable`."""
+        from dmpcli.surfaces.developable import developable
+
+        border = self.topology.border_vertices
+        return developable(self.corners, self.F, self.dihedrals, border, CREASE)
 
     @cached_property
     def _normal_maps(self) -> Floats:

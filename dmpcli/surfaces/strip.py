@@ -40,6 +40,8 @@ class Samples:
     status : array of int, shape (B,)
     sharp : array of bool, shape (B,)
         Pairs that must be unfolded; the rest of their row means nothing.
+    slivers : array of bool, shape (B,)
+        Pairs that are better unfolded: over slivers, and nowhere near a corner with a defect.
     """
 
     foot: Floats
@@ -48,6 +50,7 @@ class Samples:
     outside: Booleans
     status: Integers
     sharp: Booleans
+    slivers: Booleans
 
 
 def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
@@ -55,7 +58,7 @@ def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
     B, T = u.shape
     foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
     outside = np.empty((B, T), dtype=bool)
-    status, sharp = np.empty(B, dtype=np.int64), np.empty(B, dtype=bool)
+    status, sharp, slivers = np.empty(B, dtype=np.int64), *np.empty((2, B), dtype=bool)
     width = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
     cross_step = width / np.ceil(width / STEP - 1e-6)
     shapes = _grids(u / centre.step, v / cross_step)
@@ -69,7 +72,8 @@ def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
             )
             foot[rows], e_v[rows], normal[rows] = part.foot, part.across, part.normal
             outside[rows], status[rows], sharp[rows] = part.outside, part.status, part.sharp
-    return Samples(foot, e_v, normal, outside, status, sharp)
+            slivers[rows] = part.slivers
+    return Samples(foot, e_v, normal, outside, status, sharp, slivers)
 
 
 def _grids(u: Floats, v: Floats) -> Integers:
@@ -119,7 +123,9 @@ def _lift_alike(
         np.int64(Status.DRAWN),
     )
     sharp = _any(nodes.sharp & touched)
-    return Samples(foot, across(e_v, normal), normal, beyond | far, status, sharp)
+    slivers, stretched = mesh.developable.slivers, mesh.developable.stretched
+    better = _any(slivers[face].reshape(u.shape)) & ~_any(stretched[face].reshape(u.shape))
+    return Samples(foot, across(e_v, normal), normal, beyond | far, status, sharp, better)
 
 
 def _any(marks: Booleans) -> Booleans:
