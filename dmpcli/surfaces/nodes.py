@@ -102,17 +102,8 @@ def walk_nodes(
     B, nu, nv = len(centre.step), grid.behind + grid.ahead + 1, grid.right + grid.left + 1
     along = _Lines(B, nu)
     along.set(grid.behind, centre.origin, centre.direction, centre.normal)
-    for way, nodes in ((1, grid.ahead), (-1, grid.behind)):
-        along.walk(
-            mesh,
-            grid.behind,
-            way,
-            np.full(B, nodes),
-            centre.direction,
-            centre.step,
-            centre.sign,
-            centre.part,
-        )
+    both = np.full(B, grid.ahead), np.full(B, grid.behind)
+    along.walk(mesh, grid.behind, both, centre.step, centre.sign, centre.part)
     e_v = cross(along.normal, along.direction)
 
     lines = _Lines(B * nu, nv)
@@ -122,18 +113,15 @@ def walk_nodes(
     if along.away.any():
         # Lines that begin off the mesh look to others.
         needs = (np.full(B * nu, grid.left), np.full(B * nu, grid.right))
-    for way, count in ((1, needs[0]), (-1, needs[1])):
-        lines.walk(
-            mesh,
-            grid.right,
-            way,
-            count,
-            e_v.reshape(-1, 3),
-            np.repeat(cross_step, nu, axis=0),
-            np.repeat(centre.sign, nu, axis=0),
-            np.repeat(centre.part, nu),
-            source,
-        )
+    lines.walk(
+        mesh,
+        grid.right,
+        needs,
+        np.repeat(cross_step, nu, axis=0),
+        np.repeat(centre.sign, nu, axis=0),
+        np.repeat(centre.part, nu),
+        source,
+    )
     grid_of = (B, nu, nv)
     position = lines.position.reshape(*grid_of, 3)
     e_v = lines.direction.reshape(*grid_of, 3)
@@ -210,33 +198,41 @@ class _Lines:
         self,
         mesh: Mesh,
         at: int,
-        way: int,
-        count: Integers,
-        direction: Floats,
+        counts: tuple[Integers, Integers],
         step: Floats,
         sign: Floats,
         part: Integers,
         source: Integers | None = None,
     ) -> None:
-        """Fill `count` (M,) nodes after (`way` 1) or before (-1) node `at`.
+        """Fill `counts` (M,) nodes after node `at`, and before it.
 
         Walks that begin off the mesh are bent as walk `source` (M,) is, which begins on it.
         """
-        rows = np.flatnonzero(count > 0)
-        if len(rows) == 0:
-            return
-        front = stepping.start(
+        rows = np.flatnonzero((counts[0] > 0) | (counts[1] > 0))
+        fronts = stepping.start(
             mesh,
             self.position[rows, at],
             self.normal[rows, at],
-            way * direction[rows],
+            self.direction[rows, at],
             step[rows],
             sign[rows],
             part[rows],
         )
-        if source is not None and len(rows) == len(source):
-            _borrow_trends(front, source)
-        for k in range(1, int(count.max()) + 1):
+        for way, front, count in zip((1, -1), fronts, counts, strict=True):
+            if source is not None and len(rows) == len(source):
+                _borrow_trends(front, source)
+            self._fill(mesh, front, rows, at, way, count)
+
+    def _fill(
+        self,
+        mesh: Mesh,
+        front: stepping.Front,
+        rows: Integers,
+        at: int,
+        way: int,
+        count: Integers,
+    ) -> None:
+        for k in range(1, int(count.max(initial=0)) + 1):
             on = count[rows] >= k
             if not on.all():
                 front, rows = front.rows(on), rows[on]

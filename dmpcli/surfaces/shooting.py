@@ -102,7 +102,7 @@ def take_aim(origin: Floats, normal: Floats, goal: Floats, sign: Floats, part: I
 
 def by_steps(mesh: Mesh, aim: Aim) -> Ends:
     """Shoot along the smooth normal."""
-    front = stepping.start(
+    front, _ = stepping.start(
         mesh,
         aim.origin,
         aim.normal,

@@ -92,8 +92,8 @@ def start(
     step: Floats,
     sign: Floats,
     part: Integers,
-) -> Front:
-    """Stand M walks at points of the mesh; see `Front`.
+) -> tuple[Front, Front]:
+    """Stand M walks at points of the mesh, and M that go the other way; see `Front`.
 
     The curvature ahead is found from the normals a step ahead and a step behind.
     """
@@ -105,10 +105,14 @@ def start(
     bend = 0.5 * (bend_ahead + bend_behind) * (ahead[1] | behind[1])
     # The probes stand on a tangent, short of a step along the arc by (step κ)²/3.
     bend = bend * (1.0 + dot(bend, bend) / 3.0)
-    twice = (bend_ahead - bend_behind) * (ahead[1] & behind[1])
-    before = unit(normal - bend + 0.5 * twice)
-    on = np.zeros(len(position))
-    return Front(position, direction, normal, before, step, sign, part, bend / step, on)
+    half = 0.5 * (bend_ahead - bend_behind) * (ahead[1] & behind[1])
+
+    def front(way: float) -> Front:
+        before = unit(normal - way * bend + half)
+        on, trend = np.zeros(len(position)), way * bend / step
+        return Front(position, way * direction, normal, before, step, sign, part, trend, on)
+
+    return front(1.0), front(-1.0)
 
 
 def _probe(
