@@ -160,16 +160,17 @@ def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
 
     from dmpcli.commands.messages import progress
     from dmpcli.figures.document import reference_of
-    from dmpcli.figures.footing import placed
+    from dmpcli.figures.footing import AT_ONCE, placed
 
     reference = reference_of(parts)
     done = []
     with progress("measuring", sum(len(part.strokes) for part in parts), quiet) as advance:
         for part in parts:
             strokes = []
-            for stroke in part.strokes:
-                strokes.append(placed(stroke, ground, reference))
-                advance(1)
+            for first in range(0, len(part.strokes), AT_ONCE):
+                some = part.strokes[first : first + AT_ONCE]
+                strokes += placed(some, ground, reference)
+                advance(len(some))
             done.append(replace(part, strokes=strokes))
     return done
 

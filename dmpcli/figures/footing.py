@@ -1,15 +1,22 @@
 """How a stroke lies on the surface that a report was given, beside what the demonstration says."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.figures.stroke import Stroke
 from dmpcli.measures import surface as measure
 from dmpcli.measures.wave import WaveHeights
 from dmpcli.surfaces.plane import Plane
-from dmpcli.surfaces.protocol import Status, Surface, towards
+from dmpcli.surfaces.protocol import Hits, Status, Surface, towards
+
+AT_ONCE = 64
+"""Strokes measured together; the charts have as many in hand."""
+
+FAR = 1.0
+"""Ends of a stroke that are planned farther than this from the surface are remarked on, mm."""
 
 
 @dataclass(frozen=True)
@@ -87,41 +94,86 @@ class Footing:
         return None if self.uv is None else np.column_stack([self.uv, self.height])
 
 
-def placed(stroke: Stroke, ground: Ground, reference: Stroke | None) -> Stroke:
-    """Return a trajectory or run with its footing on the surface; a demonstration as it is.
+def placed(strokes: Sequence[Stroke], ground: Ground, reference: Stroke | None) -> list[Stroke]:
+    """Return trajectories and runs with their footing on the surface; demonstrations as they are.
 
     Parameters
     ----------
-    stroke : Stroke
+    strokes : sequence of Stroke
+        `AT_ONCE` or so, and alike in length, are quickest; the result does not depend on it.
     ground : Ground
     reference : Stroke, optional
         The demonstration.
     """
-    if stroke.kind == "demonstration":
-        return stroke
-    # A run's best-fitting plane says nothing where the surface is curved.
-    axes = None if ground.curved and stroke.bound else stroke.axes
-    return replace(stroke, axes=axes, footing=footing_of(stroke, ground.surface, reference))
+    found = [stroke for stroke in strokes if stroke.kind != "demonstration"]
+    footings = iter(_footings(found, ground.surface, reference))
+    done = []
+    for stroke in strokes:
+        if stroke.kind == "demonstration":
+            done.append(stroke)
+            continue
+        # A run's best-fitting plane says nothing where the surface is curved.
+        axes = None if ground.curved and stroke.bound else stroke.axes
+        done.append(replace(stroke, axes=axes, footing=next(footings)))
+    return done
 
 
-def footing_of(stroke: Stroke, surface: Surface, reference: Stroke | None) -> Footing:
-    """Measure how a stroke lies on a surface; see `Footing`."""
-    ends = surface.closest(np.stack([stroke.start, stroke.goal]))
-    side = None if stroke.side is None else stroke.side[None]
-    sign = towards(ends.normal[:1], side)
+def _footings(
+    strokes: Sequence[Stroke], surface: Surface, reference: Stroke | None
+) -> list[Footing]:
+    """Measure how strokes lie on a surface; see `Footing`."""
+    if not strokes:
+        return []
+    ends = surface.closest(np.array([[stroke.start, stroke.goal] for stroke in strokes]))
+    up = np.array([0.0, 0.0, 1.0])
+    side = np.array([up if stroke.side is None else stroke.side for stroke in strokes])
+    signs = towards(ends.normal[:, 0], side)
+    hits = [surface.closest(stroke.position) for stroke in strokes]
+    charted = [i for i, stroke in enumerate(strokes) if not stroke.closed]
+    feet = [hits[i].position for i in charted]
+    upward = (signs * ends.normal[:, 0])[charted]
+    places = dict(zip(charted, _places(surface, ends.position[charted], feet, upward), strict=True))
+    return [
+        _footing(
+            stroke,
+            surface,
+            reference,
+            Hits(ends.position[i], ends.normal[i], ends.distance[i], ends.face[i]),
+            hits[i],
+            float(signs[i, 0]),
+            places.get(i, _CLOSED),
+        )
+        for i, stroke in enumerate(strokes)
+    ]
+
+
+def _footing(
+    stroke: Stroke,
+    surface: Surface,
+    reference: Stroke | None,
+    ends: Hits,
+    hits: Hits,
+    sign: float,
+    place: "_Place",
+) -> Footing:
+    foot, normal = hits.position, sign * hits.normal
 
     def closest(points: Floats) -> tuple[Floats, Floats]:
-        hits = surface.closest(points)
-        return hits.position, sign * hits.normal
+        if points is stroke.position:
+            return foot, normal
+        there = surface.closest(points)
+        return there.position, sign * there.normal
 
-    foot, normal = closest(stroke.position)
-    upward = (sign * ends.normal)[0]
-    length, uv, remark = _coordinates(stroke, surface, ends.position, foot, upward)
+    length, uv = place.length, place.uv
     demonstrated = None if length is None else _stretched(reference, length)
     off = None
     # The original model has no w: it does not know what off the surface means.
     if demonstrated is not None and uv is not None and stroke.bound:
         off = measure.height_there(uv, demonstrated)
+    remark = place.remark
+    if ends.distance.max() > FAR:
+        far = f"start and goal lie {ends.distance[0]:.1f} and {ends.distance[1]:.1f} mm off it"
+        remark = far if remark is None else f"{far}; {remark}"
     return Footing(
         foot,
         normal,
@@ -147,39 +199,63 @@ def _stretched(reference: Stroke | None, length: float) -> Floats | None:
     return np.asarray(place * [length / reference.length, 1.0, 1.0])
 
 
-def _coordinates(
-    stroke: Stroke, surface: Surface, ends: Floats, foot: Floats, normal: Floats
-) -> tuple[float | None, Floats | None, str | None]:
+@dataclass(frozen=True)
+class _Place:
     """Geodesic distance of the ends, chart coordinates of the feet, and why there are none."""
-    if stroke.closed:
-        return None, None, "closed, so there is no line to measure waves from"
-    charts = surface.charts(ends[:1], ends[1:], normal)
-    status = Status(charts.status[0])
-    if status != Status.DRAWN:
-        return None, None, status.reason
-    length = float(charts.lengths[0])
-    last = Status.DRAWN
+
+    length: float | None
+    uv: Floats | None
+    remark: str | None
+
+
+_CLOSED = _Place(None, None, "closed, so there is no line to measure waves from")
+
+
+def _places(surface: Surface, ends: Floats, feet: Sequence[Floats], normal: Floats) -> list[_Place]:
+    """Places of b strokes with ends (b, 2, 3), feet (n, 3) each and normals (b, 3) at the starts.
+
+    Shorter strokes are filled up with their last foot.
+    """
+    if not feet:
+        return []
+    charts = surface.charts(ends[:, 0], ends[:, 1], normal)
+    most = max(len(foot) for foot in feet)
+    foot = np.stack([np.pad(f, ((0, most - len(f)), (0, 0)), mode="edge") for f in feet])
+    status = charts.status
 
     def lift(uv: Floats) -> tuple[Floats, Floats, Floats]:
-        nonlocal last
-        lifted = charts.lift(np.column_stack([uv, np.zeros(len(uv))])[None])
-        last = Status(lifted.status[0])
-        reached = last in (Status.DRAWN, Status.BORDER)
-        gone = np.broadcast_to(lifted.outside[0] | (not reached), len(uv))
-        point = np.where(gone[:, None], np.nan, lifted.position[0])
-        return point, lifted.axes[0, :, :, 0], lifted.axes[0, :, :, 1]
+        nonlocal status
+        lifted = charts.lift(np.concatenate([uv, np.zeros((*uv.shape[:2], 1))], axis=-1))
+        status = lifted.status
+        reached = np.isin(status, (Status.DRAWN, Status.BORDER))
+        gone: Booleans = lifted.outside | ~reached[:, None]
+        point = np.where(gone[..., None], np.nan, lifted.position)
+        return point, lifted.axes[..., 0], lifted.axes[..., 1]
 
-    uv = measure.coordinates(foot, lift, _guess(foot, ends, normal, length))
-    if np.isfinite(uv).all():
-        return length, uv, None
-    return length, None, (Status.BORDER if last == Status.DRAWN else last).reason
+    guess = [
+        _guess(f, e, n, length)
+        for f, e, n, length in zip(foot, ends, normal, charts.lengths, strict=True)
+    ]
+    uv = measure.coordinates(foot, lift, np.stack(guess))
+    places = []
+    for i, first in enumerate(charts.status):
+        if first != Status.DRAWN:
+            places.append(_Place(None, None, Status(first).reason))
+            continue
+        length, here = float(charts.lengths[i]), uv[i, : len(feet[i])]
+        if np.isfinite(here).all():
+            places.append(_Place(length, here, None))
+            continue
+        last = Status.BORDER if status[i] == Status.DRAWN else Status(status[i])
+        places.append(_Place(length, None, last.reason))
+    return places
 
 
 def _guess(foot: Floats, ends: Floats, normal: Floats, length: float) -> Floats:
     """Coordinates as on a plane through both ends."""
     way = ends[1] - ends[0]
-    chord = float(np.linalg.norm(way))
+    chord = max(float(np.linalg.norm(way)), 1e-9)  # one point: such a pair has no chart anyway
     aside = np.cross(normal, way)
     offset = foot - ends[0]
     u = offset @ way * (length / chord**2)
-    return np.stack([u, offset @ aside / np.linalg.norm(aside)], axis=1)
+    return np.stack([u, offset @ aside / max(float(np.linalg.norm(aside)), 1e-9)], axis=1)

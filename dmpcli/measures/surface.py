@@ -15,9 +15,8 @@ Closest = Callable[[Floats], tuple[Floats, Floats]]
 """Points (n, 3), mm, to the closest points of the surface and the unit normals there, (n, 3)."""
 
 Lift = Callable[[Floats], tuple[Floats, Floats, Floats]]
-"""Chart coordinates u, v (n, 2), mm, to points of the surface, e_u and e_v there, (n, 3) each.
-
-NaN where the chart does not reach.
+"""Chart coordinates u, v (b, n, 2), mm, of b strokes to points of the surface, e_u and e_v there,
+(b, n, 3) each; NaN where the chart does not reach.
 """
 
 SETTLED = 1e-6
@@ -93,42 +92,48 @@ def coordinates(foot: Floats, lift: Lift, guess: Floats) -> Floats:
     diag(g², 1) in strip coordinates (A. Gray, Tubes, 2nd ed., Birkhäuser 2004, ch. 2) g is a
     difference quotient.
 
+    Strokes do not depend on those beside them.
+
     Parameters
     ----------
-    foot : array, shape (n, 3)
-        mm.
+    foot : array, shape (b, n, 3)
+        Points of b strokes, mm.
     lift : callable
-    guess : array, shape (n, 2)
+    guess : array, shape (b, n, 2)
         mm; need not be near.
 
     Returns
     -------
-    array, shape (n, 2)
+    array, shape (b, n, 2)
         u, v, mm; NaN for points that the chart does not reach.
     """
     at = np.array(guess, dtype=float)
-    reach = 2.0 * float(np.abs(at).max()) + 10.0
+    n = at.shape[1]
+    reach = 2.0 * np.abs(at).max(axis=(1, 2), keepdims=True) + 10.0
+    looking = np.ones((len(at), 1, 1), dtype=bool)
     for _ in range(_MOST_STEPS):
-        point, e_u, e_v = lift(at)
-        ahead, _, _ = lift(at + np.array([_DIFFERENCE, 0.0]))
-        slope = np.sum((ahead - point) * e_u, axis=1) / _DIFFERENCE
+        # Both places in one: what carries them there need be prepared only once.
+        both = np.concatenate([at, at + np.array([_DIFFERENCE, 0.0])], axis=1)
+        points, along, aside = lift(both)
+        point, ahead, e_u, e_v = points[:, :n], points[:, n:], along[:, :n], aside[:, :n]
+        slope = np.sum((ahead - point) * e_u, axis=-1) / _DIFFERENCE
         gap = foot - point
         move = np.stack(
             [
-                np.sum(gap * e_u, axis=1) / np.maximum(slope, _LEAST_SLOPE),
-                np.sum(gap * e_v, axis=1),
+                np.sum(gap * e_u, axis=-1) / np.maximum(slope, _LEAST_SLOPE),
+                np.sum(gap * e_v, axis=-1),
             ],
-            axis=1,
+            axis=-1,
         )
         # Beyond the border the way back is unknown: such a point tries again nearer the middle.
-        lost = ~np.isfinite(move).all(axis=1)
+        lost = ~np.isfinite(move).all(axis=-1)
         move[lost] = -0.5 * at[lost]
-        at = np.clip(at + move, -reach, reach)
-        if np.abs(move).max() < SETTLED:
+        at = np.where(looking, np.clip(at + move, -reach, reach), at)
+        looking &= np.abs(move).max(axis=(1, 2), keepdims=True) >= SETTLED
+        if not looking.any():
             break
-    point, _, _ = lift(at)
-    found = np.linalg.norm(foot - point, axis=1) < ASTRAY
-    return np.where(found[:, None], at, np.nan)
+    found = np.linalg.norm(gap, axis=-1) < ASTRAY
+    return np.where(found[..., None], at, np.nan)
 
 
 def wave_along(uv: Floats, length: float) -> WaveHeights | None:

@@ -50,17 +50,26 @@ def flat_guess(points):
     return np.column_stack([points @ [0.0, 1.0, 0.0], points @ [0.0, 0.0, 1.0]])
 
 
+def found(foot, lift, guess):
+    """Coordinates of one stroke."""
+
+    def batched(uv):
+        return tuple(a.reshape(*uv.shape[:2], 3) for a in lift(uv.reshape(-1, 2)))
+
+    return surface.coordinates(foot[None], batched, guess[None])[0]
+
+
 @pytest.mark.parametrize("lift", [on_cylinder, on_sphere])
 def test_coordinates_are_found_from_the_points_alone(lift):
     uv = stroke()
     point = lift(uv)[0]
     guess = np.column_stack([np.linspace(0, 60.0, len(uv)), np.zeros(len(uv))])
-    assert np.abs(surface.coordinates(point, lift, guess) - uv).max() < 1e-9
+    assert np.abs(found(point, lift, guess) - uv).max() < 1e-9
 
 
 def test_v_is_the_length_of_the_perpendicular_geodesic_and_not_the_chord():
     point = R * np.array([[np.cos(0.4), 0.0, np.sin(0.4)]])
-    ((u, v),) = surface.coordinates(point, on_sphere, flat_guess(point))
+    ((u, v),) = found(point, on_sphere, flat_guess(point))
     assert u == pytest.approx(0.0, abs=1e-9)
     assert v == pytest.approx(0.4 * R, abs=1e-9)
     assert v - R * np.sin(0.4) > 0.5
@@ -72,14 +81,14 @@ def test_points_beside_the_chart_have_no_coordinates():
         return np.where(uv[:, 1:] > 10.0, np.nan, point), e_u, e_v
 
     point = on_sphere(np.array([[30.0, 5.0], [30.0, 20.0]]))[0]
-    found = surface.coordinates(point, half, flat_guess(point))
-    assert found[0] == pytest.approx([30.0, 5.0])
-    assert np.isnan(found[1]).all()
-    assert surface.wave_along(found, LENGTH) is None
+    there = found(point, half, flat_guess(point))
+    assert there[0] == pytest.approx([30.0, 5.0])
+    assert np.isnan(there[1]).all()
+    assert surface.wave_along(there, LENGTH) is None
 
 
 def test_wave_height_is_measured_along_the_surface():
-    uv = surface.coordinates(on_sphere(stroke(49.98))[0], on_sphere, stroke(30.0))
+    uv = found(on_sphere(stroke(49.98))[0], on_sphere, stroke(30.0))
     assert surface.wave_along(uv, LENGTH).mean == pytest.approx(49.98, abs=1e-3)
     assert surface.wave_along(stroke(0.1), LENGTH).mean is None
 
@@ -110,9 +119,9 @@ def test_stretch_is_one_on_a_cylinder_and_the_cosine_on_a_parallel():
     uv = stroke(n=4001)
     assert surface.stretch(on_cylinder(uv)[0], uv) == pytest.approx(1.0, abs=1e-6)
     parallel = np.column_stack([np.linspace(0, LENGTH, 2001), np.full(2001, 25.0)])
-    found = surface.stretch(on_sphere(parallel)[0], parallel)
-    assert len(found) == surface.PIECES
-    assert found == pytest.approx(np.cos(25.0 / R), abs=1e-6)
+    pieces = surface.stretch(on_sphere(parallel)[0], parallel)
+    assert len(pieces) == surface.PIECES
+    assert pieces == pytest.approx(np.cos(25.0 / R), abs=1e-6)
 
 
 def test_stretch_bears_samples_at_rest():
