@@ -33,6 +33,9 @@ MOST_ROWS = 20
 LEAST_LIFT = 5e-4
 """Heights over the demonstration's plane below this are not spoken of, mm."""
 
+FAR = 1.0
+"""Strokes planned to start or end farther than this from the surface are spoken of, mm."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -180,6 +183,11 @@ def _on_surface(report: Row, rows: Sequence[Row]) -> list[Table | str]:
         lies = row["surface"]
         if lies and lies["remark"]:
             remarks.append(f"{row['stroke']}: no wave height along the surface: {lies['remark']}.")
+        if lies and max(lies["start_off"], lies["goal_off"]) > FAR:
+            remarks.append(
+                f"{row['stroke']}: planned to start {lies['start_off']:.1f} mm and to end "
+                f"{lies['goal_off']:.1f} mm off this surface: is it the one it was drawn on?"
+            )
         if lies and (lies["lifted_max"] or 0.0) >= LEAST_LIFT:
             remarks.append(
                 f"{row['stroke']}: off the surface after taking off the demonstration's own height "

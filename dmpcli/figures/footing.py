@@ -15,9 +15,6 @@ from dmpcli.surfaces.protocol import Hits, Status, Surface, towards
 AT_ONCE = 64
 """Strokes measured together; the charts have as many in hand."""
 
-FAR = 1.0
-"""Ends of a stroke that are planned farther than this from the surface are remarked on, mm."""
-
 
 @dataclass(frozen=True)
 class Ground:
@@ -60,6 +57,8 @@ class Footing:
         Largest |w| taken off, mm; None where there is no demonstration to take it from.
     start, goal : array, shape (3,)
         Ends of the stroke as planned, snapped to the surface, mm.
+    start_off, goal_off : float
+        How far the planned ends lie off the surface, mm.
     length : float or None
         Of the geodesic between them, mm; None where none was found, and for closed strokes.
     uv : array, shape (n, 2), or None
@@ -81,6 +80,8 @@ class Footing:
     lifted: float | None
     start: Floats
     goal: Floats
+    start_off: float
+    goal_off: float
     length: float | None
     uv: Floats | None
     wave: WaveHeights | None
@@ -170,10 +171,6 @@ def _footing(
     # The original model has no w: it does not know what off the surface means.
     if demonstrated is not None and uv is not None and stroke.bound:
         off = measure.height_there(uv, demonstrated)
-    remark = place.remark
-    if ends.distance.max() > FAR:
-        far = f"start and goal lie {ends.distance[0]:.1f} and {ends.distance[1]:.1f} mm off it"
-        remark = far if remark is None else f"{far}; {remark}"
     return Footing(
         foot,
         normal,
@@ -182,12 +179,14 @@ def _footing(
         None if off is None else float(np.abs(off).max()),
         ends.position[0],
         ends.position[1],
+        float(ends.distance[0]),
+        float(ends.distance[1]),
         length,
         uv,
         None if uv is None or length is None else measure.wave_along(uv, length),
         None if stroke.rotation is None else measure.tilt(stroke.rotation, normal),
         demonstrated,
-        remark,
+        place.remark,
     )
 
 

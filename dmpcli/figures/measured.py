@@ -86,6 +86,8 @@ def _on_surface(stroke: Stroke) -> Row | None:
         "stretch_largest": None if pieces is None else float(pieces.max() - 1.0),
         "start_error": start_error,
         "goal_error": goal_error,
+        "start_off": footing.start_off,
+        "goal_off": footing.goal_off,
         "remark": footing.remark,
     }
 

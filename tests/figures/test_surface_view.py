@@ -1,9 +1,11 @@
 """Strokes on a curved surface: what is measured of them, and their picture in space."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dmpcli.figures import gallery
+from dmpcli.figures import document, gallery
 from dmpcli.figures.footing import Ground, placed
 from dmpcli.figures.measured import row_of
 from dmpcli.figures.stroke import demonstrated, strokes_of
@@ -54,7 +56,7 @@ def original():
 
 def test_a_stroke_on_the_mesh_is_measured_along_it(ground):
     # Chords of 2 mm on a radius of 86.774 mm lie 0.006 mm inside it.
-    row = row_of(placed(modified(49.98), ground, taught()), taught())
+    row = row_of(placed([modified(49.98)], ground, taught())[0], taught())
     lies = row["surface"]
     assert lies["distance_max"] < 0.0065
     assert lies["wave_height"] == pytest.approx(49.98, abs=0.02)
@@ -74,7 +76,7 @@ def test_the_originals_failure_stands_beside_it(ground):
     # Closed form: a stroke in the plane of its two ends, against the circle below it.
     y, z = stroke.position[:, 1], stroke.position[:, 2]
     off = np.hypot(y - 5.106, z - (-17.54 - 86.774)) - 86.774
-    lies = row_of(placed(stroke, ground, None), None)["surface"]
+    lies = row_of(placed([stroke], ground, None)[0], None)["surface"]
     assert lies["distance_max"] > 5.0
     assert lies["height_largest"] == pytest.approx(off.max(), abs=0.01)
     assert lies["height_least"] == pytest.approx(off.min(), abs=0.01)
@@ -87,8 +89,8 @@ def test_the_demonstrations_own_height_is_taken_off(ground):
     (stroke,) = strokes_of(record, "lifted")
     # Smooth as a hand's, so that a best-fitting plane keeps nearly all of it.
     reference = taught(wave() + lift[:, None] * [0.0, 0.0, 1.0])
-    alone = placed(stroke, ground, None).footing
-    beside = placed(stroke, ground, reference).footing
+    alone = placed([stroke], ground, None)[0].footing
+    beside = placed([stroke], ground, reference)[0].footing
     assert alone.distance.max() == pytest.approx(0.2, abs=0.01)
     assert beside.lifted == pytest.approx(0.2, abs=0.02)
     assert beside.distance.max() < 0.03
@@ -97,22 +99,59 @@ def test_the_demonstrations_own_height_is_taken_off(ground):
 def test_a_run_of_a_curved_stroke_is_measured_along_the_surface(ground):
     path, normal = fillet_wave(50.0)
     (drawn,) = strokes_of(run(curved_trajectory(path, normal)), "run")
-    assert placed(drawn, ground, None).wave.mean == pytest.approx(50.0, abs=0.02)
+    assert placed([drawn], ground, None)[0].wave.mean == pytest.approx(50.0, abs=0.02)
 
 
 def test_strokes_beside_the_mesh_say_why_they_have_no_wave_height(ground):
     V, F = ground.V, ground.F
     near = np.abs(V[F].mean(axis=1)[:, 1] + 40.0) < 15.0
     strip = Ground("strip.stl", Mesh(V, F[near]), V, F[near])
-    footing = placed(modified(), strip, None).footing
+    footing = placed([modified()], strip, None)[0].footing
     assert footing.wave is None
     assert "leaves the mesh" in footing.remark
+
+
+def test_strokes_are_measured_together_as_each_alone(ground):
+    many = [modified(30.0), original(), modified(49.98)]
+    short = modified(49.98)
+    many.append(
+        replace(
+            short, position=short.position[::2], raw=short.raw[::2], t=short.t[::2], rotation=None
+        )
+    )
+    for stroke, together in zip(many, placed(many, ground, taught()), strict=True):
+        (alone,) = placed([stroke], ground, taught())
+        np.testing.assert_allclose(together.footing.uv, alone.footing.uv, atol=1e-9)
+        np.testing.assert_allclose(together.wave.heights, alone.wave.heights, atol=1e-9)
+
+
+def said_of(stroke, ground):
+    part = document.Part("stroke", "0" * 64, "trajectory", [stroke])
+    return " ".join(document.as_text(document.document([part], {"file": ground.label}), 80).split())
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_ends_planned_off_the_surface_are_remarked_on(ground, flat):
+    if flat:
+        ground = Ground("plane.json", Plane(np.array([0.0, 0.0, -40.0]), np.array([0.0, 0.0, 1.0])))
+    stroke = modified()
+    shift = np.array([0.0, 0.0, 25.0])
+    high = replace(stroke, position=stroke.position + shift, start=stroke.start + shift)
+    (done,) = placed([high], ground, None)
+    off = [float(ground.surface.closest(p[None]).distance[0]) for p in (high.start, high.goal)]
+    assert min(off) > 1.0 or not flat
+    said = said_of(done, ground)
+    text = f"planned to start {off[0]:.1f} mm and to end {off[1]:.1f} mm off this surface"
+    assert text in said
+    (near,) = placed([modified()], ground, None)
+    said = said_of(near, ground)
+    assert ("planned to start" in said) == flat
 
 
 @pytest.fixture
 def strokes(ground):
     reference = taught()
-    return [reference, *(placed(s, ground, reference) for s in (modified(), original()))]
+    return placed([reference, modified(), original()], ground, reference)
 
 
 def test_figure_9_is_drawn_the_same_twice(strokes, ground):
@@ -170,7 +209,7 @@ def test_what_is_drawn_of_a_mesh_ends_at_the_box_and_is_coarse_enough():
 def test_a_plane_is_a_surface_too():
     level = Ground("plane.json", Plane(np.array([0.0, 0.0, -17.54]), np.array([0.0, 0.0, 1.0])))
     (stroke,) = strokes_of(trajectory(wave(height=40.0)), "flat")
-    done = placed(stroke, level, None)
+    done = placed([stroke], level, None)[0]
     assert done.footing.wave.mean == pytest.approx(done.wave.mean, abs=1e-3)
     low, high = np.zeros(3) - 20.0, np.zeros(3) + 20.0
     area = np.concatenate([p[:, 2] for p in picture(level, low, high)])
