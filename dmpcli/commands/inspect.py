@@ -15,7 +15,7 @@ def command(
         str | None,
         typer.Argument(
             metavar="FILE",
-            help="Any file of ours, or a CSV or Parquet from elsewhere; - is standard input.",
+            help="A file of ours, a mesh, or a CSV or Parquet from elsewhere; - is standard input.",
             show_default=False,
         ),
     ] = None,

@@ -14,7 +14,19 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.figures import tables
 from dmpcli.figures.measured import Row
-from dmpcli.records import documents, plane, pose, publish, record, recordings, schemas, skill, tool
+from dmpcli.records import (
+    documents,
+    mesh,
+    mesh_formats,
+    plane,
+    pose,
+    publish,
+    record,
+    recordings,
+    schemas,
+    skill,
+    tool,
+)
 from dmpcli.records import tables as records_tables
 from dmpcli.records.streams import Source
 
@@ -42,7 +54,7 @@ def inspected(source: Source) -> Row:
     ------
     InputError
         Damaged, of a newer version, or neither Parquet nor text; a skill or plane with a wrong
-        field.
+        field; a mesh that is not safe to mend.
     """
     content = source.content
     head: Row = {"file": Path(source.name).name, "sha256": source.sha256, "bytes": len(content)}
@@ -54,6 +66,9 @@ def inspected(source: Source) -> Row:
         return head | {"format": "JSON"} | _json(source)
     if source.name.endswith(".toml"):
         return head | {"format": "TOML"} | _toml(source)
+    kind = mesh_formats.format_of(source)
+    if kind is not None:
+        return head | {"format": kind} | _mesh(source)
     return head | {"format": "CSV"} | _foreign(source)
 
 
@@ -185,6 +200,20 @@ def _toml(source: Source) -> Row:
             for section in sections
             for key, value in content[section].items()
         },
+    }
+
+
+def _mesh(source: Source) -> Row:
+    content = mesh.description(source)
+    unit = content["likely_unit"]
+    guess = f"its size suggests {unit}" if unit else "its size suggests none"
+    return {
+        "ours": False,
+        "schema": None,
+        "version": None,
+        "summary": f"A triangle mesh, to draw on with --surface. It does not tell its unit: {guess}"
+        "; lengths below are in its own.",
+        "content": content,
     }
 
 

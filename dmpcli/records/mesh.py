@@ -1,6 +1,6 @@
 """Mesh files: STL, OBJ or PLY in, a checked and mended mesh in mm out."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class MeshFile(NamedTuple):
     remarks: list[str]
 
 
-def decode(source: Source, unit: str = "mm") -> MeshFile:
+def decode(source: Source, unit: str = "mm", option: str = "--unit") -> MeshFile:
     """Read a mesh file.
 
     Parameters
@@ -44,6 +44,8 @@ def decode(source: Source, unit: str = "mm") -> MeshFile:
     source : Source
     unit : {'mm', 'cm', 'm', 'in'}
         Of the file's coordinates; the formats do not say.
+    option : str
+        Where the user names the unit.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def decode(source: Source, unit: str = "mm") -> MeshFile:
     from dmpcli.surfaces.mending import mended
 
     if unit not in UNITS:
-        raise InputError(f"unit {unit}: must be one of {', '.join(UNITS)}")
+        raise InputError(f"{option} {unit}: must be one of {', '.join(UNITS)}")
     V, F = triangles(source)
     try:
         mesh = mended(V * UNITS[unit], F)
@@ -77,3 +79,40 @@ def summary(mesh: MeshFile) -> str:
         f"{len(mesh.F)} faces, {pieces} {'piece' if pieces == 1 else 'pieces'}, chordal error "
         f"estimated at {error.median:.2g} mm, at most {error.largest:.2g} mm"
     )
+
+
+def description(source: Source) -> dict[str, Any]:
+    """Say what a mesh file holds, as `decode` would read it in mm; errors are chordal ones.
+
+    Raises
+    ------
+    InputError
+        A damaged file, or a mesh that is not safe to mend; by name.
+    """
+    from dmpcli.surfaces.chordal import chordal_error
+    from dmpcli.surfaces.mending import borders, components
+
+    facets = len(triangles(source)[1])
+    mesh = decode(source)
+    error, (edges, rims) = chordal_error(mesh.V, mesh.F), borders(mesh.F)
+    low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
+    return {
+        "vertices": len(mesh.V),
+        "faces": len(mesh.F),
+        "faces_in_file": facets,
+        "pieces": components(mesh.F),
+        "border_edges": edges,
+        "borders": rims,
+        "least": low.tolist(),
+        "largest": high.tolist(),
+        "size": (high - low).tolist(),
+        "likely_unit": _likely_unit(float(np.linalg.norm(high - low))),
+        "error_median": error.median,
+        "error_largest": error.largest,
+        "remarks": mesh.remarks,
+    }
+
+
+def _likely_unit(size: float) -> str | None:
+    """Unit in which a part that is so large across is neither tiny nor huge; None if in none."""
+    return next((u for u in ("mm", "m", "cm", "in") if 20.0 <= size * UNITS[u] <= 5_000.0), None)

@@ -39,6 +39,14 @@ def triangles(source: Source) -> Triangles:
     return _reader(source)(source)
 
 
+def format_of(source: Source) -> str | None:
+    """Name the format of a mesh file by its content; None for what is no mesh."""
+    try:
+        return _NAMES[_reader(source)]
+    except InputError:
+        return None
+
+
 def _reader(source: Source) -> Callable[[Source], Triangles]:
     content = source.content
     start = content[:512].lstrip()[:5].lower()
@@ -203,3 +211,11 @@ def _check_ply_rows(source: Source) -> None:
 def _is_list(words: list[bytes]) -> bool:
     """Tell whether a row holds as many words as its first one says."""
     return words[0].isdigit() and len(words) > int(words[0])
+
+
+_NAMES: dict[Callable[[Source], Triangles], str] = {
+    _binary_stl: "binary STL",
+    _text_stl: "text STL",
+    _obj: "OBJ",
+    _ply: "PLY",
+}

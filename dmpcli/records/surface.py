@@ -37,5 +37,5 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> P
         if pose is None:
             return flat
         return Plane(pose.to_base(flat.point), pose.rotation @ flat.normal)
-    found = mesh.decode(source, unit or "mm")
+    found = mesh.decode(source, unit or "mm", "--surface-unit")
     return found if pose is None else found._replace(V=pose.to_base(found.V))

@@ -86,6 +86,18 @@ def components(F: Integers) -> int:
     return _groups(int(F.max()) + 1, pairs)[0]
 
 
+def borders(F: Integers) -> tuple[int, int]:
+    """Return the numbers of border edges of a mended mesh and of the rims that they make up."""
+    ends = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    edges, uses = np.unique(ends, axis=0, return_counts=True)
+    rim = edges[uses == 1]
+    if len(rim) == 0:
+        return 0, 0
+    _, corners = np.unique(rim, return_inverse=True)
+    corners = corners.reshape(-1, 2)
+    return len(rim), _groups(int(corners.max()) + 1, corners)[0]
+
+
 @dataclass(frozen=True)
 class _Edges:
     """The edges of faces (m, 3).

@@ -114,6 +114,35 @@ def test_a_stroke_over_the_border_is_refused_or_clipped(learned, tmp_path):
     assert 2 <= len(read(tmp_path / "t")) < 501
 
 
+def test_with_on_border_skip_only_strokes_over_the_border_are_left_out(learned, tmp_path):
+    flat = [-551.03, 131.399, -17.54, -660.021, 130.034, -17.54]
+    edge = [-551.0, 180.0, -17.54, -660.0, 180.0, -17.54]  # the bench ends at 185
+    table = tmp_path / "p.csv"
+
+    def batch(*pairs):
+        rows = [f"{i},{','.join(map(str, pair))}" for i, pair in enumerate(pairs)]
+        table.write_text("\n".join(["id,x0,y0,z0,xg,yg,zg", *rows]))
+        words = ["--pairs", table, "--surface", BENCH, "--on-border", "skip"]
+        return run(learned, "-o", tmp_path / "b", *words)
+
+    done = batch(flat, edge, START + GOAL)
+    assert done.exit_code == 0, done.stderr
+    assert "2 strokes drawn, 1 pairs skipped" in done.stderr
+    status = read(tmp_path / "b" / "pairs.parquet").columns["status"]
+    assert [s == "ok" for s in status] == [True, False, True]
+    assert "leaves the mesh" in status[1]
+    assert set(read(tmp_path / "b" / "part-00000.parquet").columns["id"]) == {"0", "2"}
+    # Any other hindrance still stops all of it.
+    done = batch(flat, edge, [*START, -657.6, -43.3, 20.0])
+    assert done.exit_code == 2
+    assert "off the surface" in done.stderr
+    # A pair on its own has nothing to be left out of.
+    one = ["--start", *edge[:3], "--goal", *edge[3:], "--surface", BENCH, "--on-border", "skip"]
+    done = run(learned, "-o", tmp_path / "t", *one)
+    assert done.exit_code == 3
+    assert not (tmp_path / "t").exists()
+
+
 def test_a_point_off_the_mesh_is_refused_by_distance(learned, tmp_path):
     done = run(
         learned, "-o", tmp_path / "t", "--start", *START, "--goal", -657.6, -43.3, 20.0,
@@ -152,7 +181,7 @@ def test_many_pairs_on_a_mesh_equal_each_alone_and_bad_ones_are_named(learned, t
     [
         (["--surface-pose", 1, 2, 3], "--surface-pose and --surface-unit say where"),
         (["--surface", BENCH, "--surface-pose", 1, 2, 3], "a pose is six numbers"),
-        (["--surface", BENCH, "--surface-unit", "ell"], "must be one of mm"),
+        (["--surface", BENCH, "--surface-unit", "ell"], "--surface-unit ell: must be one of mm"),
         (["--surface", BENCH, "--on-border", "jump"], "--on-border jump: must be"),
         (["--surface", ROOT / "README.md"], "README.md"),
     ],

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from dmpcli.cli import app
 from tests.figures.example_files import demonstration, paper_files, put, trajectory, wave
+from tests.records.meshes import box, grid, obj, written
 
 
 def dmpcli(*words, stdin=None):
@@ -134,3 +135,46 @@ def test_bad_input_is_one_clear_error(tmp_path):
         assert result.stdout == ""
         assert told in result.stderr
         assert len(result.stderr.strip().splitlines()) <= 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("stl", "binary STL"), ("stl_ascii", "text STL"), ("obj", "OBJ"), ("ply", "PLY")],
+)
+def test_meshes_tell_their_size_pieces_borders_and_fineness(tmp_path, kind, name):
+    path = tmp_path / "part"
+    path.write_bytes(written(*grid(n=9, half=40.0), kind))
+    told = found(path)
+    assert (told["format"], told["ours"]) == (name, False)
+    content = told["content"]
+    assert (content["vertices"], content["faces"], content["pieces"]) == (81, 128, 1)
+    assert (content["border_edges"], content["borders"]) == (32, 1)
+    assert content["size"] == pytest.approx([80.0, 80.0, 2 * 40.0**2 / 240], abs=1e-5)
+    assert content["likely_unit"] == "mm"
+    # Chords of edges of 10 mm, and diagonals, on z = (x² - y²) / 240.
+    assert content["error_largest"] == pytest.approx(10.0**2 / 960, rel=0.2)
+    text = dmpcli(path).stdout
+    assert max(map(len, text.splitlines())) <= 80
+    assert "faces" in text
+
+
+def test_a_closed_mesh_has_no_border_and_one_in_metres_is_suspected(tmp_path):
+    V, F = box()
+    path = tmp_path / "box.ply"
+    path.write_bytes(written(1e-3 * V, F, "ply"))
+    content = found(path)["content"]
+    assert (content["borders"], content["pieces"], content["likely_unit"]) == (0, 1, "m")
+
+
+def test_what_mending_did_to_a_mesh_is_told_and_the_rest_refused(tmp_path):
+    V, F = grid()
+    path = tmp_path / "part.obj"
+    path.write_bytes(obj(np.vstack([V, [[0.0, 0.0, 9.0]]]), np.vstack([F, F[:1]])))
+    content = found(path)["content"]
+    assert content["faces_in_file"] == len(F) + 1
+    assert content["faces"] == len(F)
+    assert any("twice" in remark or "duplicate" in remark for remark in content["remarks"])
+    path.write_bytes(obj(V, F + 1))
+    result = dmpcli(path)
+    assert result.exit_code == 2
+    assert "part.obj" in result.stderr

@@ -1,0 +1,79 @@
+"""What becomes of strokes that leave the surface: fail, clip or skip."""
+
+import numpy as np
+import pytest
+
+from dmpcli.errors import RefusedError
+from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.learning import fit
+from dmpcli.primitives.preparation import Choices
+from dmpcli.records import dataset, record, streams
+from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.record import Provenance
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.protocol import Status
+from tests.primitives.strokes import paper_stroke
+from tests.records.meshes import grid
+
+INSIDE, OVER = [-54.0, 0.0, 0.0, 54.0, 0.0, 0.0], [-54.0, 60.0, 0.0, 54.0, 60.0, 0.0]
+
+
+@pytest.fixture(scope="module")
+def skill():
+    return fit([paper_stroke()], Choices(regression="ridge")).skill
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return Mesh(*grid(n=17, half=75.0, height=lambda x, y: 0.0 * x))
+
+
+def table_of(*ends):
+    ends = np.array(ends)
+    ids = [str(i) for i in range(len(ends))]
+    pairs = Pairs(ends[:, :3], ends[:, 3:], None, None)
+    places = [f"line {i + 2}" for i in range(len(ends))]
+    return PairTable("p.csv", ids, pairs, places, np.full(len(ends), np.nan), [OK] * len(ends))
+
+
+def write(folder, skill, mesh, table, on_border, stop=True):
+    task = dataset.Task(skill, mesh, Style(), on_border)
+    lasting = np.full(len(table), skill.duration)
+    done = []
+    dataset.write(
+        folder, task, table, table.pairs, lasting, Provenance("generalize"), stop, done.append
+    )
+    return done
+
+
+def test_settled_clips_skips_or_refuses(skill, mesh):
+    table = table_of(INSIDE, OVER)
+    lasting = np.full(2, skill.duration)
+    inside, over = draw(skill, table.pairs, lasting, mesh, Style())
+    assert over.status == Status.BORDER
+    for on_border in ("fail", "clip", "skip"):
+        task = dataset.Task(skill, mesh, Style(), on_border)
+        assert dataset.settled(task, inside) == (inside, OK)
+        kept, status = dataset.settled(task, over)
+        assert (status == OK) == (on_border == "clip")
+        assert len(kept.position) < len(over.position) or on_border != "clip"
+        assert np.abs(kept.position[:, 1]).max() <= 75.0 + 1e-6 or on_border != "clip"
+
+
+def test_skip_leaves_out_strokes_over_the_border_and_nothing_else(skill, mesh, tmp_path):
+    table = table_of(INSIDE, OVER, INSIDE)
+    assert sum(write(tmp_path / "b", skill, mesh, table, "skip")) == 3
+    assert [status == OK for status in table.status] == [True, False, True]
+    assert Status.BORDER.reason in table.status[1]
+    part = record.decode(streams.read(tmp_path / "b" / "part-00000.parquet"))
+    assert set(part.columns["id"]) == {"0", "2"}
+    point = [0.0, 0.0, 0.0]
+    for on_border, bad in (("fail", OVER), ("skip", point + point)):
+        table = table_of(INSIDE, bad)
+        with pytest.raises(RefusedError, match="line 3, pair 1"):
+            write(tmp_path / on_border, skill, mesh, table, on_border)
+        assert not (tmp_path / on_border).exists()
+        table = table_of(INSIDE, bad)
+        write(tmp_path / on_border, skill, mesh, table, on_border, stop=False)
+        assert [status == OK for status in table.status] == [True, False]
