@@ -71,6 +71,9 @@ class MeshCharts:
             better = smooth[part.slivers & ~part.sharp & (part.status == Status.DRAWN)]
             if len(better):
                 self._improve(better, coordinates[better], foot, axes)
+        if self.mesh.noise > 0.0:
+            # Straight lines over noisy facets go astray by millimetres.
+            status[unfolded], unfolded[:] = Status.NOISY, False
         creased = np.flatnonzero(unfolded)
         if len(creased):
             foot[creased], axes[creased], outside[creased], status[creased] = self._unfold(

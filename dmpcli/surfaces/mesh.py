@@ -7,6 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.protocol import Connections, Hits, Status, Walks
+from dmpcli.surfaces.roughness import averaged, noise
 from dmpcli.surfaces.topology import Topology
 from dmpcli.surfaces.vectors import cross, dot, length, unit
 
@@ -62,12 +63,13 @@ class Mesh:
 
         Weighted by the corners' angles (G. Thürmer, C. Wüthrich: Computing vertex normals from
         polygonal facets. Journal of Graphics Tools 3 (1998) 43-46); at creases each side has its
-        own.
+        own. Of noisy scans they are averages over several edges.
         """
         import igl
 
-        weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE
-        normals = igl.per_vertex_normals(self.V, self.F, weighting)[self.F]
+        if self.noise > 0.0:
+            return averaged(self._vertex_normals, self.F)[self.F]
+        normals = self._vertex_normals[self.F]
         sharp = self.dihedrals > CREASE
         if sharp.any():
             at = np.zeros(len(self.V), dtype=bool)
@@ -75,6 +77,19 @@ class Mesh:
             split = igl.per_corner_normals(self.V, self.F, CREASE).reshape(-1, 3, 3)
             normals = np.where(at[self.F][..., None], split, normals)
         return unit(normals)
+
+    @cached_property
+    def _vertex_normals(self) -> Floats:
+        import igl
+
+        weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE
+        return np.asarray(igl.per_vertex_normals(self.V, self.F, weighting))
+
+    @cached_property
+    def noise(self) -> float:
+        """Estimated standard deviation of a scan's vertices, mm; 0 of a smooth mesh."""
+        of = (self.face_normals, self._vertex_normals, self.F, self.dihedrals, self.edge_length)
+        return noise(*of)
 
     @cached_property
     def dihedrals(self) -> Floats:
@@ -150,7 +165,7 @@ class Mesh:
     @cached_property
     def reach(self) -> float:
         """Largest distance between the mesh and the smooth course of a stroke over it, mm."""
-        return max(LEAST_REACH, 5.0 * self.chordal_error)
+        return max(LEAST_REACH, 5.0 * self.chordal_error, 6.0 * self.noise)
 
     def search(self, points: Floats) -> tuple[Floats, Integers]:
         """Closest points (N, 3), mm, and their faces (N,); quickest in the order of a path."""

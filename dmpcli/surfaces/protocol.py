@@ -26,6 +26,7 @@ class Status(IntEnum):
     BORDER = 5
     FOLDED = 6
     LOST = 7
+    NOISY = 8
 
     @property
     def reason(self) -> str:
@@ -42,6 +43,7 @@ _REASONS = {
     Status.BORDER: "the stroke leaves the mesh or crosses a hole",
     Status.FOLDED: "the chart folds: the stroke swings wider than the surface's curvature allows",
     Status.LOST: "the surface has a gap or a step beside the stroke",
+    Status.NOISY: "the stroke crosses a crease of a noisy scan; smooth the scan first",
 }
 
 

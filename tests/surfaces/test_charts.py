@@ -221,3 +221,52 @@ def test_slivers_of_a_surface_curved_both_ways_are_not_unfolded():
     mesh = Mesh(*fields.grid(ball, 200, 20, (-0.6, 0.6), (-0.6, 0.6)))
     assert not mesh.developable.slivers.any()
     assert mesh.developable.stretched.mean() > 0.9
+
+
+def noisy(mesh, sigma):
+    rng = np.random.default_rng(1)
+    return Mesh(mesh.V + sigma * rng.normal(size=mesh.V.shape), mesh.F)
+
+
+@pytest.mark.parametrize("name", cases.SURFACES)
+@pytest.mark.parametrize("sigma", [0.05, 0.1])
+def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma):
+    smooth, case = cases.mesh(name, 35_000), cases.case(name, 12, 300)
+    assert smooth.noise == 0.0
+    mesh = noisy(smooth, sigma)  # edges of 1.5 mm: facets meet at up to 50°
+    assert mesh.noise == pytest.approx(sigma, rel=0.2)
+    _, lift = cases.drawn(mesh, case)
+    assert (lift.status == Status.DRAWN).all()
+    assert not lift.unfolded.any()
+    off, n = lift.position - case.position, case.axes[..., 2]
+    beside = np.linalg.norm(off - np.sum(off * n, axis=-1, keepdims=True) * n, axis=-1)
+    assert beside.max() < (2.5 if name != "bumpy" else 3.5) * sigma
+    assert np.linalg.norm(off, axis=-1).max() < 4.5 * sigma
+    assert cases.turns(lift.axes).max() < cases.turns(case.axes).max() + 3.0
+
+
+@pytest.mark.parametrize("degrees", [10.0, 25.0, 40.0, 60.0, 90.0])
+def test_folds_of_a_noisy_scan_are_drawn_well_or_refused(degrees):
+    sigma, a = 0.1, np.radians(degrees)
+    mesh = noisy(folded(degrees, half=90.0, cells=120), sigma)
+    heading = np.linspace(-1.0, 1.0, 7)
+    u = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
+    start = -54.5 * u + [1.3, 0.0]
+
+    def over(xy):
+        x, y = xy[..., 0], xy[..., 1]
+        return np.stack(
+            [np.where(x < 0, x, x * np.cos(a)), y, np.where(x < 0, 0, -x * np.sin(a))], -1
+        )
+
+    coordinates = fields.strokes(np.full(7, 109.0), 300)
+    sheet = start[:, None] + coordinates[..., :1] * u[:, None] + coordinates[..., 1:2] * v[:, None]
+    charts = mesh.charts(over(start), over(start + 109.0 * u))
+    lift = charts.lift(coordinates)
+    off = np.linalg.norm(lift.position - over(sheet), axis=-1).max(axis=1)
+    drawn = lift.status == Status.DRAWN
+    assert drawn.all() == (degrees <= 25.0)
+    assert (off[drawn] < 6.0 * sigma).all()
+    assert not drawn.any() or degrees <= 30.0
+    assert set(lift.status[~drawn]) <= {Status.NOISY, Status.NO_GEODESIC, Status.LOST}
