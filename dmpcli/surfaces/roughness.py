@@ -17,9 +17,7 @@ _NOISE = 0.75
 _LEAST, _LARGEST = 0.5, 30.0
 # Rounds of averaging. More of them carry strokes better over gentle shapes, worse over lively ones.
 _ROUNDS = 3
-
-
-# Measured on grids of noisy vertices, four shapes, 0.02 to 0.15 mm on 1.5 mm: 0.60 to 0.64.
+# Noise over tilt times edge length: 0.60 to 0.64 on four shapes, 0.02 to 0.15 mm on 1.5 mm.
 _SIGMA = 0.63
 
 
@@ -58,7 +56,5 @@ def averaged(normals: Floats, faces: Integers) -> Floats:
     touches = csr_array((ones, (rows, faces.reshape(-1))), shape=(len(faces), count))
     back = csr_array(touches.T)
     for _ in range(_ROUNDS):
-        facets: Floats = touches @ normals
-        corners: Floats = back @ unit(facets)
-        normals = unit(corners)
+        normals = unit(np.asarray(back @ unit(np.asarray(touches @ normals))))
     return normals
