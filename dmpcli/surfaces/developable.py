@@ -33,7 +33,7 @@ class Developable:
         Long, narrow, at an angle to a neighbour, and without defect at their corners.
     stretched : array of bool
         With a corner of smooth surroundings and a defect: straight lines pass it on either side in
-        different directions, which jitters.
+        different directions, which jitters. Not looked for in meshes without slivers.
     """
 
     slivers: Booleans
@@ -61,7 +61,9 @@ def developable(
     sizes = length(edges)[..., 0]
     area = length(cross(edges[:, 0], edges[:, 1]))[:, 0]
     slender = sizes.max(axis=1) ** 2 > _SLENDER * area
-    bent = (dihedrals > np.degrees(_FLAT)).any(axis=1)
+    slivers = slender & (dihedrals > np.degrees(_FLAT)).any(axis=1)
+    if not slivers.any():
+        return Developable(slivers, np.zeros(len(faces), dtype=bool))
     back = -np.roll(edges, 1, axis=1)
     angle = np.arctan2(length(cross(edges, back))[..., 0], dot(edges, back)[..., 0])
     defect = 2.0 * np.pi - np.bincount(faces.reshape(-1), angle.reshape(-1), len(on_border))
@@ -69,4 +71,4 @@ def developable(
     sharp = dihedrals > crease
     exempt[faces[sharp]] = exempt[np.roll(faces, -1, axis=1)[sharp]] = True
     stretched = (~exempt & (np.abs(defect) > _DEFECT))[faces].any(axis=1)
-    return Developable(slender & bent & ~stretched, stretched)
+    return Developable(slivers & ~stretched, stretched)
