@@ -26,3 +26,8 @@ class InstrumentError(DmpError):
     """An instrument cannot be reached, or failed while running (exit code 4)."""
 
     exit_code = 4
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words: 1 pose, 2 poses."""
+    return f"{number} {what}" + ("" if number == 1 else "s")

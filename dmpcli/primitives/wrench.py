@@ -33,6 +33,8 @@ class Tool:
         Angles U and V of the robot's base against the vertical, rad; see `gravity`.
     zero : array, shape (6,), optional
         What the sensor reads with nothing on it, N and N·m; None where it is not known.
+    sensor : str
+        The sensor that the zero was found with; empty where it is not known.
     """
 
     tcp_position: Floats
@@ -43,6 +45,7 @@ class Tool:
     centre: Floats
     inclination: Floats = field(default_factory=lambda: np.zeros(2))
     zero: Floats | None = None
+    sensor: str = ""
 
     @property
     def sensor_in_tcp(self) -> Floats:
@@ -53,6 +56,23 @@ class Tool:
     def lever(self) -> Floats:
         """From the sensor's origin to the TCP, sensor axes, shape (3,), mm."""
         return self.sensor_rotation.T @ (self.tcp_position - self.sensor_position)
+
+    def flange(self, position: Floats, rotation: Floats) -> tuple[Floats, Floats]:
+        """Pose of the flange where the TCP has a pose.
+
+        Parameters
+        ----------
+        position : array, shape (..., 3)
+            Of the TCP, mm.
+        rotation : array, shape (..., 3, 3)
+
+        Returns
+        -------
+        position : array, shape (..., 3)
+        rotation : array, shape (..., 3, 3)
+        """
+        R = rotation @ self.tcp_rotation.T
+        return position - R @ self.tcp_position, R
 
     def with_zero(self, zero: Floats | None) -> "Tool":
         """Return the same tool with another zero, shape (6,)."""
@@ -78,6 +98,28 @@ def gravity(weight: float, inclination: Floats) -> Floats:
     """
     u, v = inclination
     return weight * np.array([np.cos(u) * np.sin(v), -np.sin(u), -np.cos(u) * np.cos(v)])
+
+
+def weight_and_inclination(load: Floats) -> tuple[float, Floats]:
+    """Weight and inclination of a weight vector; undoes `gravity`.
+
+    ``G = |L|``, ``U = asin(-L_y / G)``, ``V = atan2(L_x, -L_z)``.
+
+    Parameters
+    ----------
+    load : array, shape (3,)
+        Base axes, N.
+
+    Returns
+    -------
+    weight : float
+        N.
+    inclination : array, shape (2,)
+        U in [-π/2, π/2] and V in (-π, π], rad.
+    """
+    x, y, z = load
+    weight = float(np.linalg.norm(load))
+    return weight, np.array([np.arctan2(-y, np.hypot(x, z)), np.arctan2(x, -z)])
 
 
 def of_weight(R: Floats, load: Floats, centre: Floats) -> Floats:

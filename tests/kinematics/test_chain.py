@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from dmpcli.kinematics import chain, models
+from dmpcli.rotations import log
+from tests.kinematics import urdf
+
+EC66 = models.model("ec66")
+
+
+def test_the_chain_is_that_of_the_makers_urdf_in_position_and_orientation():
+    q = np.random.default_rng(3).uniform(-2 * np.pi, 2 * np.pi, (100, 6))
+    position, rotation = chain.forward(EC66, q)
+    for i in range(len(q)):
+        p, R = urdf.flange(q[i])
+        assert position[i] == pytest.approx(p, abs=1e-9)
+        assert np.abs(rotation[i] - R).max() < 1e-12
+
+
+def test_any_leading_shape_gives_what_one_configuration_gives():
+    q = np.random.default_rng(4).uniform(-3, 3, (2, 3, 6))
+    position, rotation = chain.forward(EC66, q)
+    assert position.shape == (2, 3, 3)
+    assert rotation.shape == (2, 3, 3, 3)
+    one = chain.forward(EC66, q[1, 2])
+    assert np.array_equal(position[1, 2], one[0])
+    assert np.array_equal(rotation[1, 2], one[1])
+    assert np.array_equal(chain.jacobian(EC66, q)[1, 2], chain.jacobian(EC66, q[1, 2]))
+
+
+def test_the_jacobian_is_the_derivative_of_the_chain():
+    step = 1e-6
+    for q in np.random.default_rng(5).uniform(-3, 3, (50, 6)):
+        J = chain.jacobian(EC66, q)
+        for i in range(6):
+            ahead, behind = q.copy(), q.copy()
+            ahead[i] += step
+            behind[i] -= step
+            p1, R1 = chain.forward(EC66, ahead)
+            p0, R0 = chain.forward(EC66, behind)
+            assert J[:3, i] == pytest.approx((p1 - p0) / (2 * step), abs=1e-5)
+            assert J[3:, i] == pytest.approx(log(R1 @ R0.T) / (2 * step), abs=1e-8)
