@@ -3,15 +3,15 @@
 A comparison with NaN is false, so every guard here says what it accepts, not what it refuses.
 """
 
-from collections import deque
+import math
 from collections.abc import Callable
 from contextlib import ExitStack
 
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InstrumentError, RefusedError
-from dmpcli.instruments.protocols import RobotState, ServoInfo
+from dmpcli.errors import InputError, InstrumentError, RefusedError
+from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
 
 Box = tuple[float, float, float, float, float, float]
 """xmin, xmax, ymin, ymax, zmin, zmax, mm, base frame."""
@@ -33,6 +33,32 @@ def ordered(box: Box) -> Box:
     return box
 
 
+def check_streams(robot: Servo) -> None:
+    """Refuse a robot that takes no set-points, before it is opened.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(robot, PlanPlayer):
+        raise InputError("--robot: mode=file only plays whole plans; leave it out")
+
+
+def check_ready(state: RobotState) -> None:
+    """Refuse to go on where the arm may not move, in the controller's words.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if state.mode != "ready":
+        why = f" ({state.detail})" if state.detail else ""
+        pressed = "release it and " if state.mode == "emergency stop" else ""
+        raise RefusedError(
+            f"robot: {state.mode}{why}; {pressed}clear it on the pendant and try again"
+        )
+
+
 def check_state(state: RobotState, box: Box | None = None) -> None:
     """Refuse to go on where the arm is not ready, or not where it may be.
 
@@ -49,8 +75,7 @@ def check_state(state: RobotState, box: Box | None = None) -> None:
     InstrumentError
         The pose is not a number.
     """
-    if state.mode != "ready":
-        raise RefusedError(f"robot: {state.mode}; clear it on the pendant and try again")
+    check_ready(state)
     if not (np.isfinite(state.position).all() and np.isfinite(state.rotation).all()):
         raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
     check_inside(state.position, box, "the tool")
@@ -99,6 +124,30 @@ def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:
     check_inside(position, box, "the next set-point")
 
 
+def check_wrench(wrench: Floats, force: float, torque: float) -> None:
+    """Refuse to go on against more than the tool may meet.
+
+    Parameters
+    ----------
+    wrench : array, shape (6,)
+        On the tool, at the TCP.
+    force, torque : float
+        The most of either, N and N·m.
+
+    Raises
+    ------
+    RefusedError
+    """
+    parts = ((wrench[:3], force, "force", "N"), (wrench[3:], torque, "torque", "N·m"))
+    for part, most, name, unit in parts:
+        size = math.sqrt(part @ part)
+        if not size <= most:
+            raise RefusedError(
+                f"{name} {size:.3g} {unit} on the tool is over {most:g} {unit}; raise "
+                f"--max-{name} if it may meet that"
+            )
+
+
 def check_late(late: float, info: ServoInfo, period: float) -> None:
     """Refuse a cycle that woke later than half the look-ahead, or than one period if that is more.
 
@@ -137,31 +186,38 @@ class Trail:
         s.
     distance, angle : float
         How far the arm may stray from the nearest of them, mm and rad.
+
+    Attributes
+    ----------
+    last : tuple of array, or None
+        The set-point sent last.
     """
 
     def __init__(self, info: ServoInfo, period: float, distance: float, angle: float) -> None:
         window = int(np.ceil((info.lookahead + LAG) / period - 1e-9)) + 1
-        self._sent: deque[tuple[Floats, Floats]] = deque(maxlen=window)
+        self._positions, self._rotations = np.zeros((window, 3)), np.zeros((window, 9))
+        self._count = 0
         self._distance, self._angle = distance, angle
-
-    @property
-    def last(self) -> tuple[Floats, Floats] | None:
-        """The set-point sent last."""
-        return self._sent[-1] if self._sent else None
+        self.last: tuple[Floats, Floats] | None = None
 
     def add(self, position: Floats, rotation: Floats) -> None:
         """Remember a set-point that was sent."""
-        self._sent.append((position, rotation))
+        at = self._count % len(self._positions)
+        self._positions[at], self._rotations[at] = position, rotation.ravel()
+        self._count += 1
+        self.last = (position, rotation)
 
     def strayed(self, state: RobotState) -> tuple[float, float]:
         """Distance and angle to the nearest set-point, mm and rad; 0 before the first."""
-        if not self._sent:
+        if self.last is None:
             return 0.0, 0.0
-        positions = np.array([p for p, _ in self._sent])
-        traces = np.einsum("nij,ij->n", np.array([R for _, R in self._sent]), state.rotation)
-        cosine = np.clip((traces.max() - 1.0) / 2.0, -1.0, 1.0)
-        distance = np.linalg.norm(positions - state.position, axis=1).min()
-        return float(distance), float(np.arccos(cosine))
+        known = min(self._count, len(self._positions))
+        away = self._positions[:known] - state.position
+        nearest = float((away * away).sum(axis=1).min())
+        trace = float((self._rotations[:known] @ state.rotation.ravel()).max())
+        # In this order a NaN stays one.
+        cosine = min(max((trace - 1.0) / 2.0, -1.0), 1.0)
+        return math.sqrt(nearest), math.acos(cosine)
 
     def check(self, state: RobotState) -> None:
         """Refuse to go on where the arm does not follow.

@@ -1,12 +1,23 @@
-"""SIGINT and SIGTERM as a request that the loop reads, not as an exception in its midst."""
+"""Signals as a request that the loop reads, not as an exception in its midst.
+
+SIGINT and SIGTERM, and what a terminal sends: SIGQUIT, and SIGHUP when it is closed, unless that is
+ignored (``nohup``). SIGTSTP (Ctrl-Z) is ignored: a loop that is suspended leaves the arm to itself.
+"""
 
 import signal
 from types import FrameType, TracebackType
 from typing import Any
 
+_COUNTED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_LAST = 3
+
 
 class Interruption:
     """While it is entered, signals are counted instead of ending the process.
+
+    The third is the last one: a loop that is stuck after two would not heed it either. Handlers
+    are then as they were before, so that a fourth ends the process; the third itself does not, for
+    the second's stop may still be under way.
 
     Attributes
     ----------
@@ -22,8 +33,10 @@ class Interruption:
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "Interruption":
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, self.receive)
+        for number in _COUNTED:
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self.receive)
+        self._before[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
         return self
 
     def __exit__(
@@ -39,3 +52,7 @@ class Interruption:
         """Count one signal."""
         self.number = self.number or number
         self.count += 1
+        if self.count == _LAST:
+            for known, handler in self._before.items():
+                if known != signal.SIGTSTP:
+                    signal.signal(known, handler)

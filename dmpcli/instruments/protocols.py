@@ -4,12 +4,17 @@ A driver converts at the edge: whatever it speaks on the wire, these values are 
 N·m, rotations as matrices, times on the clock that the loop runs on.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
 
 RobotMode = Literal["ready", "stopped", "emergency stop", "protective stop", "fault", "not ready"]
+
+
+VIRTUAL = "virtual"
+"""Serial number of a simulated box, by which a recording knows it over the wire."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +28,20 @@ class SensorInfo:
         Samples per second, Hz.
     limit : array, shape (6,)
         Measuring range per axis, N and N·m; a reading at the limit is saturated.
+    product, serial : str
+        What it is and which one, where it tells; empty where it does not.
     """
 
     make: str
     rate: float
     limit: Floats
+    product: str = ""
+    serial: str = ""
+
+    @property
+    def identity(self) -> str:
+        """All that tells this sensor from another one."""
+        return " ".join(part for part in (self.make, self.product, self.serial) if part)
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,8 @@ class Sample:
         False when the sensor flags itself, or the reading is saturated.
     lost : int
         Samples lost since the start.
+    reason : str
+        Why it is not healthy, where the driver knows.
     """
 
     t: float
@@ -53,6 +69,7 @@ class Sample:
     wrench: Floats
     healthy: bool
     lost: int
+    reason: str = ""
 
 
 class Sensor(Protocol):
@@ -82,11 +99,16 @@ class ServoInfo:
         Shortest and longest servo period it takes, s.
     lookahead : float
         Time between a set-point's arrival and its being reached, s.
+    queues : bool
+        Whether it takes one set-point per period from a queue of one look-ahead, by its own clock.
+        Each deadline without a set-point then leaves the queue one shorter for good, unless the
+        set-points that are owed are handed in later: they only queue, each for its own period.
     """
 
     make: str
     period_range: tuple[float, float]
     lookahead: float
+    queues: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,12 +124,18 @@ class RobotState:
     rotation : array, shape (3, 3)
     mode : str
         Anything but ``ready`` forbids motion.
+    joints : array, shape (n,), or None
+        Actual joint angles, rad, where the robot tells them.
+    detail : str
+        What the controller says about a mode that is not ``ready``.
     """
 
     t: float
     position: Floats
     rotation: Floats
     mode: RobotMode
+    joints: Floats | None = None
+    detail: str = ""
 
 
 class Servo(Protocol):
@@ -138,6 +166,23 @@ class DragTeaching(Protocol):
 
     def drag(self) -> None:
         """Hand the arm over to its own drag teaching, until `Servo.stop`."""
+
+
+@runtime_checkable
+class PlanPlayer(Protocol):
+    """What a robot that plays a whole plan by itself offers besides `Servo`."""
+
+    def upload(
+        self, position: Floats, rotation: Floats, period: float, meanwhile: Callable[[], None]
+    ) -> None:
+        """Hand over set-points `period` s apart, shape (n, 3) in mm and (n, 3, 3).
+
+        Nothing moves; RefusedError where the arm cannot run them. `meanwhile` is called again and
+        again, for it may take long, and must not call the robot; what it raises ends the upload.
+        """
+
+    def play(self) -> None:
+        """Begin to move; the controller keeps the time, until the end or `Servo.stop`."""
 
 
 class Clock(Protocol):

@@ -7,9 +7,10 @@ motion, as is silence. Between two samples a loop goes on; without a fresh one i
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InstrumentError
+from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo
 from dmpcli.primitives.compensation import rest_zero
+from dmpcli.primitives.identification import LEVER
 from dmpcli.primitives.wrench import Tool
 
 SILENCE = 0.1
@@ -47,12 +48,30 @@ class Sensing:
     def __init__(
         self, sensor: Sensor, info: SensorInfo, rate: float, period: float, clock: Clock
     ) -> None:
-        self._sensor, self._clock = sensor, clock
+        self._sensor, self._info, self._clock = sensor, info, clock
         self._limit = RANGE_SHARE * info.limit
         self._stale = STALE * max(period, 1.0 / rate)
         self.newest = Sample(clock.now(), 0, np.zeros(6), healthy=True, lost=0)
 
-    def zeroed(self, tool: Tool, rotation: Floats, pause: float) -> Tool:
+    def first(self, pause: float) -> list[Sample]:
+        """Wait for so many seconds; return the samples meanwhile, of which there must be some.
+
+        Raises
+        ------
+        InstrumentError
+            Nothing came, or nothing that may be believed.
+        """
+        self._clock.sleep_until(self._clock.now() + pause)
+        samples = self._poll()
+        if not samples:
+            raise InstrumentError(
+                f"force sensor: sends nothing within {pause:g} s; check cable and power"
+            )
+        return samples
+
+    def zeroed(
+        self, tool: Tool, rotation: Floats, pause: float, tolerance: float | None = None
+    ) -> Tool:
         """Wait at rest for the first samples; return the tool with its zero.
 
         Parameters
@@ -63,22 +82,28 @@ class Sensing:
             Of the tool meanwhile.
         pause : float
             How long a zero takes, s.
+        tolerance : float, optional
+            By how much a zero that is known may miss the reading, N, and at 0.1 m in N·m; None
+            does not check it.
 
         Raises
         ------
         InstrumentError
             Nothing came, or nothing that may be believed.
+        RefusedError
+            The zero belongs to another sensor, or the tool does not explain the reading.
         """
-        pause = SILENCE if tool.zero is not None else pause
-        self._clock.sleep_until(self._clock.now() + pause)
-        samples = self._poll()
-        if not samples:
-            raise InstrumentError(
-                f"force sensor: sends nothing within {pause:g} s; check cable and power"
-            )
-        if tool.zero is not None:
+        if tool.zero is None:
+            samples = self.first(pause)
+            zero = rest_zero(tool, np.array([s.wrench for s in samples]), rotation)
+            return tool.with_zero(zero)
+        if tolerance is None:
+            self.first(SILENCE)
             return tool
-        return tool.with_zero(rest_zero(tool, np.array([s.wrench for s in samples]), rotation))
+        _check_sensor(tool, self._info)
+        samples = self.first(SILENCE)
+        _check_rest(tool, np.array([s.wrench for s in samples]), rotation, tolerance)
+        return tool
 
     def hear(self, now: float) -> list[Sample]:
         """Return the samples since the last call, oldest first.
@@ -96,9 +121,26 @@ class Sensing:
             )
         return samples
 
+    def recent(self, now: float) -> list[Sample]:
+        """Return what is young enough to be believed of the samples since the last call.
+
+        All are checked. Where none came meanwhile the newest one counts on while it is young;
+        what a longer wait has gathered is past, and would hide a contact in a mean.
+
+        Raises
+        ------
+        InstrumentError
+            As in `hear`.
+        """
+        samples = self.hear(now) or [self.newest]
+        return [sample for sample in samples if self._young(sample, now)]
+
     def fresh(self, now: float) -> bool:
         """Tell whether the newest sample is young enough to be believed."""
-        return now - self.newest.t <= self._stale + 1e-9  # less is rounding
+        return self._young(self.newest, now)
+
+    def _young(self, sample: Sample, now: float) -> bool:
+        return now - sample.t <= self._stale + 1e-9  # less is rounding
 
     def _poll(self) -> list[Sample]:
         samples = self._sensor.poll()
@@ -108,6 +150,8 @@ class Sensing:
         return samples
 
     def _check(self, sample: Sample) -> None:
+        if not sample.healthy and sample.reason:
+            raise InstrumentError(f"force sensor: sample {sample.seq}: {sample.reason}, stopped")
         if not sample.healthy:
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is saturated or flagged as faulty, stopped; "
@@ -124,3 +168,28 @@ class Sensing:
                 f"force sensor: {_AXES[axis]} = {sample.wrench[axis]:.3g} is over "
                 f"{RANGE_SHARE:.0%} of its range, stopped; use less force"
             )
+
+
+def _check_sensor(tool: Tool, info: SensorInfo) -> None:
+    if tool.sensor and tool.sensor != info.identity:
+        raise RefusedError(
+            f"--tool: was calibrated with the sensor {tool.sensor}, and {info.identity} is "
+            "connected; calibrate with this one: dmpcli calibrate"
+        )
+
+
+def _check_rest(tool: Tool, sensed: Floats, rotation: Floats, tolerance: float) -> None:
+    """Refuse a tool whose zero and payload do not explain the readings at rest.
+
+    A contact explains what they leave as well as another tool does: a pen that rests on a plate
+    reads like a lighter tool. So neither may be larger than the tolerance.
+    """
+    left = rest_zero(tool, sensed, rotation) - (np.zeros(6) if tool.zero is None else tool.zero)
+    force, torque = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
+    if not (force <= tolerance and torque <= LEVER * tolerance):
+        raise RefusedError(
+            f"--tool: at rest {force:.2f} N and {torque:.3f} N·m are left of the sensor's reading, "
+            f"over {tolerance:g} N and {LEVER * tolerance:g} N·m: let go of the tool and lift it "
+            "clear;\nif nothing touches it, the calibration is of another tool or out of date: "
+            "dmpcli calibrate; if it shall press on something: --tool-check N"
+        )

@@ -7,8 +7,8 @@ from dmpcli.errors import InstrumentError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.mock import PEN, PEN_DOWN, Faults, Lab, MockSensor, MockServo, Plate, Scene
 from dmpcli.instruments.mock.arms import DraggedArm
-from dmpcli.instruments.mock.lab import contact
 from dmpcli.instruments.mock.parameters import DragTeaching, Sensor, Servo
+from dmpcli.instruments.mock.wrist import contact
 from dmpcli.instruments.protocols import DragTeaching as TeachesByDrag
 from dmpcli.primitives import wrench
 from dmpcli.rotations import exp, log

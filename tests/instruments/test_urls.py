@@ -1,14 +1,16 @@
 import contextlib
+from importlib import metadata
+from importlib.metadata import EntryPoint, EntryPoints
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.errors import InputError
-from dmpcli.instruments import urls
+from dmpcli.errors import InputError, InstrumentError
+from dmpcli.instruments import conversion, registry, urls
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.instruments.mock import Plate, Scene
+from dmpcli.instruments.mock import MockSensor, Plate, Scene
 from dmpcli.rotations import from_euler
 
 
@@ -48,6 +50,14 @@ def test_there_need_not_be_a_plate():
         ("elite://10.0.0.1", "sensor", "no such instrument"),
         ("netft:", "sensor", "needs a host"),
         ("elite://", "robot", "needs a host"),
+        ("elite://h:port", "robot", "Port could not be cast"),
+        ("elite://h:70000", "robot", "out of range"),
+        ("elite://h:0", "robot", "only a host"),
+        ("elite://h/arm", "robot", "only a host"),
+        ("elite://me@h", "robot", "only a host"),
+        ("elite://[::1", "robot", "Invalid IPv6"),
+        ("elite://h?x", "robot", "key=value"),
+        ("elite://h?x=1&x=2", "robot", "x: is given twice"),
         ("mock://lab", "robot", "no host"),
         ("mock:?colour=red", "robot", "colour: the mock has no such option; it has x, y"),
         ("mock:?x", "robot", "key=value"),
@@ -72,7 +82,7 @@ def test_a_wrong_url_is_refused_with_what_would_do(url, role, words):
 
 @given(st.text(max_size=30))
 def test_any_text_is_an_address_or_an_input_error(text):
-    for url in (text, "mock:?" + text):
+    for url in (text, "mock:?" + text, "elite://" + text):
         with contextlib.suppress(InputError):
             assert urls.parse(url, "robot").role == "robot"
 
@@ -84,18 +94,86 @@ def test_a_real_instrument_beside_a_mock_one_needs_to_be_meant():
         urls.check("mock:", "netft://10.0.0.1")
 
 
+class Driver:
+    """A robot of a make that a test installs."""
+
+    def __init__(self, address, clock):
+        self.address, self.clock = address, clock
+
+
+class Gauge(Driver):
+    """A sensor of such a make."""
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """Register `Driver` and `Gauge` as the drivers of ``brand:`` URLs."""
+    points = [
+        EntryPoint("brand", f"{__name__}:Driver", "dmpcli.robots"),
+        EntryPoint("brand", f"{__name__}:Gauge", "dmpcli.sensors"),
+        EntryPoint("broken", "no_such_package:make", "dmpcli.robots"),
+        EntryPoint("twice", f"{__name__}:Driver", "dmpcli.robots"),
+        EntryPoint("twice", f"{__name__}:Gauge", "dmpcli.robots"),
+    ]
+    monkeypatch.setattr(metadata, "entry_points", lambda **only: EntryPoints(points).select(**only))
+
+
+def test_drivers_are_found_by_their_entry_points(installed):
+    bench = urls.connect(
+        "brand://arm.local:99?gain=2&name=a%20b", "brand://[fe80::1]", clock := SimulatedClock()
+    )
+    sensor = bench.sensor
+    assert (sensor.address.host, sensor.address.port, sensor.clock) == ("fe80::1", None, clock)
+    assert bench.lab is None
+    assert not bench.simulated
+    assert isinstance(bench.robot, conversion.PoseServo)
+    assert "no --tool FILE" in bench.note
+    address = urls.parse("brand://arm.local:99?gain=2&name=a%20b", "robot")
+    assert (address.host, address.port) == ("arm.local", 99)
+    assert address.options == {"gain": "2", "name": "a b"}
+    assert str(address) == "--robot brand://arm.local:99"
+
+
+def test_an_unknown_scheme_names_those_that_are_installed(installed):
+    with pytest.raises(InputError, match="one of mock:, brand://HOST, broken://HOST, twice://HO"):
+        urls.check("elite://10.0.0.1")
+
+
 @pytest.mark.parametrize(
-    ("robot", "sensor", "mixed"),
-    [
-        ("elite://10.0.0.1", "netft://10.0.0.2", False),
-        ("ur://10.0.0.1", "mock:", True),
-        ("mock:", "netft://10.0.0.2", True),
-    ],
+    ("scheme", "words"), [("broken", "no_such_package"), ("twice", "both claim it")]
 )
-def test_real_instruments_are_refused_in_one_line(robot, sensor, mixed):
-    with pytest.raises(InputError, match=r"speaks mock: only") as error:
-        urls.check(robot, sensor, mixed)
+def test_a_driver_that_cannot_be_had_is_one_line(installed, scheme, words):
+    with pytest.raises(InputError, match=words) as error:
+        urls.connect(f"{scheme}://h", None, SimulatedClock())
     assert "\n" not in str(error.value)
+
+
+def test_the_makes_of_this_package_are_installed():
+    assert {"elite", "ur"} <= set(registry.schemes("robot"))
+    assert "netft" in registry.schemes("sensor")
+
+
+def test_a_mock_one_beside_a_real_one_has_its_own_lab_in_which_nobody_draws(installed):
+    bench = urls.connect("brand://h", "mock:?seed=3", SimulatedClock(), allow_mixed=True)
+    assert isinstance(bench.sensor, MockSensor)
+    assert (bench.lab, bench.simulated) == (None, True)
+    bench = urls.connect("mock:?x=5", "brand://h", SimulatedClock(), allow_mixed=True)
+    assert isinstance(bench.sensor, Gauge)
+    assert bench.robot.state().position[0] == 5.0
+    assert (bench.lab, bench.simulated) == (None, True)
+
+
+def test_a_real_robot_needs_no_sensor(installed):
+    assert len(urls.check("brand://h", None)) == 1
+    bench = urls.connect("brand://h", None, SimulatedClock())
+    bench.sensor.close()
+    assert bench.sensor.poll() == []
+    assert not bench.simulated
+    with pytest.raises(InstrumentError, match="--sensor URL"):
+        bench.sensor.open()
 
 
 def test_two_urls_that_disagree_on_the_one_lab_are_refused():

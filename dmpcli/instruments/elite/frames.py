@@ -1,0 +1,186 @@
+"""The EC controller's monitor frames: 1024 bytes, big-endian; cut out of a byte stream and checked.
+
+The layout is that of two public decoders, which agree; neither states a unit. So nothing but the
+joint angles and the state is used, and the driver compares the angles with those of the JSON-RPC.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+
+SIZE = 1024
+MATCHING_WORD = 0xEC8056EC
+"""What public decoders find in a frame's last four bytes."""
+
+FRAME = np.dtype(
+    [
+        ("size", ">u4"),
+        ("timestamp", ">u8"),  # ms since the epoch
+        ("cycle", "u1"),
+        ("joints", ">f8", 8),
+        ("tcp_base", ">f8", 6),
+        ("tcp_user", ">f8", 6),
+        ("torque", ">f8", 8),
+        ("state", ">i4"),
+        ("servo_ready", ">i4"),
+        ("motors_synchronised", ">i4"),  # can_motor_run of the decoders
+        ("motor_speed", ">i4", 8),  # rpm
+        ("mode", ">i4"),
+        ("analog_in", ">f8", 3),
+        ("analog_out", ">f8", 5),
+        ("digital_in", ">u8"),
+        ("digital_out", ">u8"),
+        ("collision", "u1"),
+        ("flange_base", ">f8", 6),
+        ("flange_user", ">f8", 6),
+        ("estop", "u1"),
+        ("tcp_speed", ">f8"),
+        ("joint_speed", ">f8", 8),
+        ("tcp_acceleration", ">f8"),
+        ("joint_acceleration", ">f8", 8),
+        ("temperature", ">f8", 6),
+        ("joint_torque", ">f8", 6),
+        ("external_torque", ">f8", 6),
+        ("tcp_force", ">f8", 6),
+        ("drag", "u1"),
+        ("reserved", "u1", 220),
+        ("word", ">u4"),
+    ]
+)
+"""One frame; 1024 bytes without padding."""
+
+# No joint of an EC arm turns further; an angle beyond is no angle in degrees or radians.
+_LARGEST_ANGLE = 720.0
+
+_HEAD = SIZE.to_bytes(4, "big")
+_FLAGS = ("servo_ready", "motors_synchronised", "collision", "estop")
+
+
+class BadFrameError(Exception):
+    """A frame that cannot be believed; the text names the fault."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What one frame says.
+
+    Attributes
+    ----------
+    t : float
+        When it arrived, s, on the run's clock.
+    timestamp : int
+        The controller's own, ms.
+    joints : array, shape (6,)
+        Angles in the monitor's unit.
+    state, mode : int
+        As getRobotState and getRobotMode answer.
+    servo_ready, motors_synchronised, collision, estop : bool
+    """
+
+    t: float
+    timestamp: int
+    joints: Floats
+    state: int
+    mode: int
+    servo_ready: bool
+    motors_synchronised: bool
+    collision: bool
+    estop: bool
+
+
+def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:
+    """Read one frame.
+
+    Parameters
+    ----------
+    frame : bytes
+        1024 of them.
+    t : float
+        When it arrived, s.
+    word : int or None
+        The matching word; None lets any pass.
+
+    Raises
+    ------
+    BadFrameError
+        Its size or matching word is wrong, a joint angle is not a number or out of range, or state
+        or mode is unknown.
+    """
+    if len(frame) != SIZE:
+        raise BadFrameError(f"has {len(frame)} bytes, not {SIZE}")
+    row = np.frombuffer(frame, FRAME)[0]
+    if row["size"] != SIZE:
+        raise BadFrameError(f"says that it has {row['size']} bytes, not {SIZE}")
+    if word is not None and row["word"] != word:
+        raise BadFrameError(f"ends in {row['word']:#010x}, not in the matching word {word:#010x}")
+    joints = row["joints"][:6].astype(float)
+    if not (np.abs(joints) <= _LARGEST_ANGLE).all():
+        raise BadFrameError(f"holds what is no joint angle: {joints.tolist()}")
+    state, mode = int(row["state"]), int(row["mode"])
+    if not (0 <= state <= 5 and 0 <= mode <= 2):
+        raise BadFrameError(f"holds an unknown state or mode: {state}, {mode}")
+    flags = {flag: int(row[flag]) for flag in _FLAGS}
+    for flag, value in flags.items():
+        if value not in (0, 1):
+            raise BadFrameError(f"holds what is neither yes nor no: {flag} {value}")
+    known = {flag: bool(value) for flag, value in flags.items()}
+    return Report(t, int(row["timestamp"]), joints, state, mode, **known)
+
+
+class FrameBuffer:
+    """Cuts frames out of a stream of bytes, and finds the next one after garbage.
+
+    Parameters
+    ----------
+    word : int or None
+        The matching word; None lets any pass.
+
+    Attributes
+    ----------
+    skipped : int
+        Bytes that belonged to no frame.
+    lost : bool
+        Whether the last thing heard was no frame that could be believed.
+    fault : str
+        What was wrong when it last got lost; empty where it never did.
+    """
+
+    def __init__(self, word: int | None = MATCHING_WORD) -> None:
+        self._word = word
+        self._pending = b""
+        self.skipped = 0
+        self.lost = False
+        self.fault = ""
+
+    def feed(self, received: bytes, t: float) -> list[Report]:
+        """Take in bytes; return what their whole frames say, oldest first.
+
+        Parameters
+        ----------
+        received : bytes
+        t : float
+            When they arrived, s.
+        """
+        self._pending += received
+        reports = []
+        while len(self._pending) >= SIZE:
+            head = self._pending.find(_HEAD)
+            if head != 0:
+                # Go on from the next place where a frame could begin; its head may be cut.
+                rest = len(self._pending) - len(_HEAD) + 1
+                self._skip(head if head > 0 else rest, "does not begin where the last one ended")
+                continue
+            try:
+                reports.append(decode(self._pending[:SIZE], t, self._word))
+                self._pending, self.lost = self._pending[SIZE:], False
+            except BadFrameError as error:
+                self._skip(1, str(error))  # a good one may begin inside it
+        return reports
+
+    def _skip(self, count: int, fault: str) -> None:
+        self.skipped += count
+        self._pending = self._pending[count:]
+        if not self.lost:
+            self.lost, self.fault = True, fault

@@ -1,0 +1,77 @@
+"""Poses as controllers write them: in mm or m, rad or deg, and four forms of an orientation."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.instruments.drivers import Declaration, Orientation
+from dmpcli.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
+
+METRE = 1000.0
+
+Pose = tuple[Floats, Floats]
+"""Position, shape (3,), in mm, and rotation, shape (3, 3)."""
+
+
+def decode(declared: Declaration, values: Floats) -> Pose:
+    """Turn a pose as a controller writes it into mm and a matrix.
+
+    Parameters
+    ----------
+    declared : Declaration
+    values : array, shape (6,) or (7,)
+        Position first, then the orientation in the declared form.
+
+    Returns
+    -------
+    position : array, shape (3,)
+        mm.
+    rotation : array, shape (3, 3)
+    """
+    position = values[:3] * (METRE if declared.length == "m" else 1.0)
+    turn = values[3:]
+    if declared.orientation == "quaternion":
+        return position, from_quaternion(turn[[1, 2, 3, 0]])
+    angles = np.radians(turn) if declared.angle == "deg" else turn
+    if declared.orientation == "rotation vector":
+        return position, exp(angles)
+    if declared.orientation == "xyz euler":
+        return position, from_euler(angles)
+    return position, from_euler(-angles).T  # Rz Ry Rx is the inverse of Rx(-rx) Ry(-ry) Rz(-rz)
+
+
+def encode(declared: Declaration, position: Floats, rotation: Floats) -> Floats:
+    """Turn mm and a matrix into a pose as a controller reads it; undoes `decode`.
+
+    Parameters
+    ----------
+    declared : Declaration
+    position : array, shape (3,)
+        mm.
+    rotation : array, shape (3, 3)
+
+    Returns
+    -------
+    array, shape (6,) or (7,)
+    """
+    length = position / (METRE if declared.length == "m" else 1.0)
+    if declared.orientation == "quaternion":
+        return np.concatenate([length, to_quaternion(rotation)[[3, 0, 1, 2]]])
+    if declared.orientation == "rotation vector":
+        angles = log(rotation)
+    elif declared.orientation == "xyz euler":
+        angles = to_euler(rotation)
+    else:
+        angles = -to_euler(rotation.T)
+    return np.concatenate([length, np.degrees(angles) if declared.angle == "deg" else angles])
+
+
+def width(declared: Declaration) -> int:
+    """Return how many numbers a pose has."""
+    return 7 if declared.orientation == "quaternion" else 6
+
+
+def otherwise(declared: Declaration, orientation: Orientation) -> Declaration:
+    """Return the declaration with another orientation form."""
+    return replace(declared, orientation=orientation)

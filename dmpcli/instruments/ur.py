@@ -1,0 +1,344 @@
+"""``ur://HOST``: Universal Robots' arms (CB3 and e-Series) by their servoL, through ur-rtde.
+
+The package is an extra: ``pip install dmpcli[ur]``. Poses are in m with a rotation vector, of the
+TCP that is set on the robot, in its base frame. Nothing is started on the robot before `UrDriver.
+start`, so that a dry run only reads. ur-rtde connects without a time limit and keeps Python's lock
+meanwhile; whether there is a robot that answers is therefore found out before it is let in.
+
+It is no force sensor: the force that the robot tells is its own estimate at the TCP in base axes,
+without the payload that it was told, and not the reading of a sensor on the flange that the
+compensation of a tool expects.
+"""
+
+import contextlib
+import importlib
+import socket
+import struct
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
+from dmpcli.instruments import sockets
+from dmpcli.instruments.address import Address
+from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.options import Options
+from dmpcli.instruments.protocols import Clock, RobotMode
+
+T = TypeVar("T")
+
+RTDE_PORT, DASHBOARD_PORT = 30004, 29999
+"""The robot's own; ur-rtde knows no others."""
+
+VARIABLES = (
+    "timestamp",
+    "actual_q",
+    "actual_TCP_pose",
+    "robot_mode",
+    "safety_mode",
+    "robot_status_bits",
+    "safety_status_bits",
+)
+"""What the robot is asked to send, every cycle."""
+
+_PATIENCE = 1.0
+# Without a new time stamp from the controller for so long, s, its state is not believed.
+_SILENCE = 0.2
+_RUNNING = 7  # ROBOT_MODE_RUNNING: power on, brakes released
+_SAFETY_NORMAL = 1
+_SAFETY: dict[int, tuple[RobotMode, str]] = {
+    _SAFETY_NORMAL: ("ready", ""),
+    2: ("ready", "reduced mode"),
+    3: ("protective stop", ""),
+    4: ("not ready", "recovery mode"),
+    5: ("stopped", "safeguard stop"),
+    6: ("emergency stop", "system"),
+    7: ("emergency stop", "robot"),
+    8: ("fault", "safety violation"),
+    9: ("fault", "safety fault"),
+}
+_REQUEST_VERSION = struct.pack(">HBH", 5, ord("V"), 2)
+
+
+def make(address: Address, clock: Clock) -> "UrDriver":
+    """Return the driver of a URL such as ``ur://HOST?lookahead=0.1&gain=300``.
+
+    Raises
+    ------
+    InputError
+        It names a port, or an option that is unknown or out of range.
+    """
+    if address.port is not None:
+        raise InputError(f"{address}: the robot's ports are fixed; leave the port out")
+    options = Options(address)
+    driver = UrDriver(
+        address.host,
+        clock,
+        lookahead=options.number("lookahead", 0.1, 0.03, 0.2, "s"),
+        gain=options.number("gain", 300.0, 100.0, 2000.0, ""),
+        deceleration=options.number("deceleration", 10.0, 0.1, 100.0, "m/s²"),
+        watchdog=options.number("watchdog", 10.0, 1.0, 100.0, "Hz"),
+    )
+    options.done()
+    return driver
+
+
+class UrDriver:
+    """A `ServoDriver` for UR arms.
+
+    Parameters
+    ----------
+    host : str
+    clock : Clock
+        Real.
+    lookahead : float
+        Over which servoL smooths, s.
+    gain : float
+        Of servoL's position control.
+    deceleration : float
+        Of the stop, m/s².
+    watchdog : float
+        The robot stops by itself when set-points come less often, Hz.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        clock: Clock,
+        *,
+        lookahead: float,
+        gain: float,
+        deceleration: float,
+        watchdog: float,
+    ) -> None:
+        self._host, self._clock = host, clock
+        self._lookahead, self._gain, self._deceleration = lookahead, gain, deceleration
+        self._watchdog = watchdog
+        self._period = 0.0
+        self._receive: Any = None
+        self._control: Any = None
+        self._servoing = False
+        self._stamp: tuple[float, float] | None = None  # the controller's and when it was new
+
+    def connect(self) -> Declaration:
+        """Connect for reading; nothing starts on the robot.
+
+        Raises
+        ------
+        InputError
+            ur-rtde is not installed.
+        InstrumentError
+            There is no robot, or none that speaks RTDE.
+        """
+        interface = _package("rtde_receive").RTDEReceiveInterface
+        self._probe()
+        self._receive = self._asked(
+            "connecting", lambda: interface(self._host, variables=list(VARIABLES))
+        )
+        # Longer than a period at which the robot's own watchdog would stop it is never sent.
+        return Declaration(
+            make="Universal Robots",
+            space="pose",
+            pacing="client",
+            period_range=(0.002, 0.5 / self._watchdog),
+            lookahead=self._lookahead,
+            length="m",
+            angle="rad",
+            orientation="rotation vector",
+        )
+
+    def state(self) -> DriverState:
+        """Return what the robot last reported.
+
+        Raises
+        ------
+        InstrumentError
+            The connection is lost, or nothing new came for 0.2 s.
+        """
+        receive = self._receive
+        if receive is None:
+            raise InstrumentError(f"{self._name}: not connected")
+        if not self._asked("connection", receive.isConnected):
+            raise InstrumentError(f"{self._name}: the connection is lost; check cable and power")
+        now = self._clock.now()
+        stamp = float(self._asked("time stamp", receive.getTimestamp))
+        if self._stamp is None or stamp != self._stamp[0]:
+            self._stamp = stamp, now
+        silent = now - self._stamp[1]
+        if not silent <= _SILENCE:
+            raise InstrumentError(
+                f"{self._name}: silent for {silent:.2f} s; check cable and controller"
+            )
+        pose = np.array(self._asked("pose", receive.getActualTCPPose), dtype=float)
+        joints = np.array(self._asked("joints", receive.getActualQ), dtype=float)
+        mode, detail = self._mode()
+        return DriverState(self._stamp[1], mode, joints, pose, detail)
+
+    def start(self, period: float) -> None:
+        """Start the control script on the robot, with its watchdog.
+
+        Raises
+        ------
+        InputError
+            ur-rtde is not installed.
+        RefusedError
+            The robot is not ready.
+        InstrumentError
+            It does not let itself be controlled: not in remote control, or used by another client.
+        """
+        interface = _package("rtde_control").RTDEControlInterface
+        mode, detail = self._mode()
+        if mode != "ready":
+            raise RefusedError(
+                f"{self._name}: {mode}{f' ({detail})' if detail else ''}; clear it on the pendant"
+            )
+        if self._control is None:
+            self._open(DASHBOARD_PORT).close()
+            self._control = self._asked(
+                "its control script, which needs remote control,",
+                lambda: interface(self._host),
+            )
+        control = self._control
+        self._asked("setWatchdog", lambda: control.setWatchdog(self._watchdog))
+        self._period = period
+
+    def send(self, target: Floats) -> bool:
+        """Send one set-point by servoL; the first one only if the robot says that it is safe.
+
+        Raises
+        ------
+        RefusedError
+            The first set-point is out of the robot's reach or safety limits.
+        InstrumentError
+            The connection failed.
+        """
+        control = self._control
+        if control is None or not np.isfinite(target).all():
+            return False
+        pose = target.tolist()
+        if not self._servoing:
+            # Later ones are watched by the controller itself, which stops; asking takes a cycle.
+            if not self._asked(
+                "isPoseWithinSafetyLimits", lambda: control.isPoseWithinSafetyLimits(pose)
+            ):
+                raise RefusedError(
+                    f"{self._name}: the first set-point is out of its reach or safety limits; "
+                    "move the stroke, or mend the limits on the pendant"
+                )
+            self._servoing = True
+        self._asked("kickWatchdog", control.kickWatchdog)
+        unused = 0.0  # speed and acceleration, which servoL ignores
+        return bool(
+            self._asked(
+                "servoL",
+                lambda: control.servoL(
+                    pose, unused, unused, self._period, self._lookahead, self._gain
+                ),
+            )
+        )
+
+    def buffer_level(self) -> int | None:
+        """The robot holds no set-points that it would tell of."""
+        return None
+
+    def stop(self) -> None:
+        """Decelerate and end servo mode; the script on the robot stays until `close`."""
+        control = self._control
+        if not self._servoing or control is None:
+            return
+        done = self._asked("servoStop", lambda: control.servoStop(self._deceleration))
+        if not done and self._asked("program", control.isProgramRunning):
+            raise InstrumentError(
+                f"{self._name}: did not do servoStop; it may still be moving: press its emergency "
+                "stop"
+            )
+        self._servoing = False  # only now: what failed is tried again
+
+    def close(self) -> None:
+        """Stop, end the script and disconnect, whatever fails on the way."""
+        failed: DmpError | None = None
+        deeds: list[Callable[[], object]] = [self.stop]
+        if self._control is not None:
+            deeds += [self._control.stopScript, self._control.disconnect]
+        if self._receive is not None:
+            deeds.append(self._receive.disconnect)
+        for deed in deeds:
+            try:
+                self._asked("disconnecting", deed)
+            except InstrumentError as error:
+                failed = failed or error
+        self._control = self._receive = None
+        self._stamp, self._servoing = None, False
+        if failed is not None:
+            raise failed
+
+    @property
+    def _name(self) -> str:
+        return f"robot ur://{self._host}"
+
+    def _mode(self) -> tuple[RobotMode, str]:
+        receive = self._receive
+        if receive is None:
+            raise InstrumentError(f"{self._name}: not connected")
+        safety = int(self._asked("safety mode", receive.getSafetyMode))
+        mode, detail = _SAFETY.get(safety, ("fault", f"safety mode {safety}"))
+        if self._asked("emergency stop", receive.isEmergencyStopped):
+            return "emergency stop", detail
+        if self._asked("protective stop", receive.isProtectiveStopped):
+            return "protective stop", detail
+        if mode != "ready":
+            return mode, detail
+        running = int(self._asked("robot mode", receive.getRobotMode))
+        if running != _RUNNING:
+            return "not ready", f"robot mode {running}: power on and release the brakes"
+        if self._servoing and not self._asked("program", self._control.isProgramRunning):
+            return "stopped", "the program on the robot was stopped"
+        return mode, detail
+
+    def _probe(self) -> None:
+        """Make sure that a robot answers on RTDE: ask for version 2 of the protocol.
+
+        Raises
+        ------
+        InstrumentError
+        """
+        with self._open(RTDE_PORT) as link:
+            link.settimeout(_PATIENCE)
+            answer = b""
+            with contextlib.suppress(OSError):
+                link.sendall(_REQUEST_VERSION)
+                while len(answer) < 4 and (more := link.recv(4 - len(answer))):
+                    answer += more
+        if answer != struct.pack(">HBB", 4, ord("V"), 1):
+            raise InstrumentError(
+                f"{self._name}: port {RTDE_PORT} answers, but not as a UR robot does; "
+                "check the address, and that the robot has RTDE (CB3.1 from 3.4, e-Series)"
+            )
+
+    def _open(self, port: int) -> socket.socket:
+        return sockets.connect(self._host, port, _PATIENCE, f"{self._name}, port {port}")
+
+    def _asked(self, what: str, call: Callable[[], T]) -> T:
+        """Call ur-rtde, which raises RuntimeError for whatever fails."""
+        try:
+            return call()
+        except (RuntimeError, OSError, ValueError) as error:
+            said = " ".join(str(error).split()) or type(error).__name__
+            raise InstrumentError(f"{self._name}: {what} failed: {said}") from None
+
+
+def _package(name: str) -> Any:
+    """Import one of ur-rtde's modules.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise InputError(
+            f"--robot ur: needs ur-rtde, which is not installed: pip install 'dmpcli[ur]' ({error})"
+        ) from None

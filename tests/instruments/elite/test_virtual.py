@@ -1,0 +1,170 @@
+"""The drivers against the virtual controller: another reading of the same document."""
+
+import re
+import time
+
+import numpy as np
+import pytest
+
+from dmpcli.errors import DmpError, InstrumentError, RefusedError
+from dmpcli.instruments import guards, urls
+from dmpcli.instruments.clock import MonotonicClock
+from dmpcli.instruments.interruption import Interruption
+from dmpcli.instruments.mock import PEN
+from dmpcli.instruments.virtual import faults
+from dmpcli.instruments.virtual.lab import Setting, VirtualLab
+from dmpcli.instruments.virtual.service import ControllerService
+from dmpcli.streaming.limits import Limits
+from dmpcli.streaming.loop import DONE, Arm, Loop, Watch
+from dmpcli.streaming.plan import Stroke, make
+from dmpcli.streaming.playback import Playback
+
+START = np.array([-450.0, -120.0, 150.0])
+LIMITS = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
+PERIOD = 0.02
+
+
+class Bench:
+    """A virtual controller on free ports, and the servo that speaks to it."""
+
+    def __init__(self, *specifications, tool=PEN, **options):
+        said = faults.parse(specifications)
+        setting = Setting(START, habits=said.habits, events=said.events)
+        self.service = ControllerService(VirtualLab(setting))
+        # Both ends and the loop share one process here: nothing is said about how fast they are.
+        slow = {"monitor_port": self.service.monitor_port, "lookahead": 0.5, "oldest": 0.5}
+        given = slow | options
+        more = "&".join(f"{key}={value}" for key, value in given.items())
+        url = f"elite://127.0.0.1:{self.service.robot_port}?{more}"
+        self.clock = MonotonicClock()
+        self.servo = urls.connect(url, None, self.clock, tool=tool).robot
+
+    def loop(self, kind=Loop, duration=1.0, interruption=None):
+        info = self.servo.open()
+        state = self.servo.state()
+        assert state.mode == "ready"
+        t = np.linspace(0.0, duration, 101)
+        s = t / duration
+        u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        way = state.position + u[:, None] * [20.0, 10.0, 0.0]
+        stroke = Stroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
+        here = (state.position, state.rotation)
+        plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
+        arm = Arm(self.servo, info, self.clock)
+        return kind(plan, LIMITS, Watch(5.0, 0.1, 50.0, 5.0), arm), way
+
+    def close(self):
+        self.servo.close()
+        self.service.close()
+
+
+@pytest.fixture
+def bench():
+    made = []
+
+    def build(*specifications, **options):
+        made.append(Bench(*specifications, **options))
+        return made[-1]
+
+    yield build
+    for each in made:
+        guards.leave(each.close)
+
+
+def stands(state):
+    """Check that the arm is at rest once its servos have settled; return where."""
+    time.sleep(0.2)
+    at = state().position
+    time.sleep(0.1)
+    np.testing.assert_allclose(state().position, at, atol=0.01)
+    return at
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize("newline", ["yes", "no"])
+def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
+    made = bench(f"newline={newline}", mode=mode)
+    loop, way = made.loop(kind)
+    outcome = loop.run(Interruption())
+    assert outcome.reason == DONE
+    columns = loop.log.columns()
+    actual = np.column_stack([columns[name] for name in "xyz"])
+    np.testing.assert_allclose(actual[-1], way[-1], atol=0.05)
+    # Wherever it was seen, that was on the way, whose points are 0.42 mm apart at most.
+    gaps = np.linalg.norm(actual[:, None] - way[None], axis=2).min(axis=1)
+    assert gaps.max() < 0.3
+    assert len(actual) > 40
+    assert set(columns["state"]) == {"ready"}
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize(
+    ("fault", "words", "error"),
+    [
+        ("estop@0.4", "emergency stop", RefusedError),
+        ("collision@0.4", "protective stop.*collision", RefusedError),
+        ("mode=teach@0.4", "not ready.*teach mode|not in remote mode", RefusedError),
+        ("drop=monitor@0.4", "no new state", InstrumentError),
+    ],
+)
+def test_what_happens_on_the_way_stops_it_with_its_reason(bench, kind, mode, fault, words, error):
+    loop, _ = bench(fault, mode=mode).loop(kind)
+    outcome = loop.run(Interruption())
+    assert isinstance(outcome.failure, error)
+    with pytest.raises(DmpError, match=words):
+        raise outcome.failure
+    assert len(loop.log) < 60
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
+    made = bench("drop=robot@0.4", mode=mode)
+    loop, way = made.loop(kind)
+    outcome = loop.run(Interruption())
+    assert re.search("closed the connection|Broken pipe|reset by peer", outcome.reason)
+    assert "emergency stop" not in outcome.reason
+    assert np.linalg.norm(stands(made.servo.state) - way[-1]) > 2.0
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+def test_a_signal_ends_it_and_the_arm_stands(bench, kind, mode):
+    made = bench(mode=mode)
+    loop, way = made.loop(kind)
+    interruption = Interruption()
+    state = made.servo.state
+
+    def counted():
+        if len(loop.log) == 20:
+            interruption.receive(2)
+        return state()
+
+    made.servo.state = counted
+    loop._arm.servo.state = counted
+    outcome = loop.run(interruption)
+    ends = {"stream": "decelerated along the path", "file": "stopped by the controller"}
+    assert outcome.reason == f"SIGINT: {ends[mode]}"
+    assert np.linalg.norm(stands(state) - way[-1]) > 2.0
+
+
+def test_euler_angles_of_the_other_kind_are_found_out_and_can_be_chosen(bench):
+    with pytest.raises(RefusedError, match="euler=zyx"):
+        bench("euler=zyx").servo.open()
+    bench("euler=zyx", euler="zyx").servo.open()
+
+
+def test_a_tool_that_the_controller_does_not_know_is_refused(bench):
+    with pytest.raises(RefusedError, match=r"apart; .*tool=N"):
+        bench(tool=None).servo.open()
+    bench(tool=None, check=0).servo.open()
+
+
+@pytest.mark.parametrize("habit", ["alarm", "hold", "decelerate"])
+def test_an_arm_that_gets_no_more_set_points_stands_or_says_so(bench, habit):
+    made = bench(f"underrun={habit}")
+    made.servo.open()
+    made.servo.start(PERIOD)
+    at = made.servo.state().position
+    time.sleep(0.9)
+    state = made.servo.state()
+    np.testing.assert_allclose(state.position, at, atol=0.05)
+    assert (state.mode == "fault") == (habit == "alarm")
