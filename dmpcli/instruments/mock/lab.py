@@ -5,28 +5,16 @@ forces of hand and plate follow from the pose it has. Time advances when somebod
 sensor's grid, so that simulated and real time give the same experiment.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.instruments.mock.arms import DraggedArm, ServoArm
-from dmpcli.instruments.mock.parameters import Plate, Scene
+from dmpcli.instruments.mock.parameters import Scene
+from dmpcli.instruments.mock.wrist import Hand, Wrist, contact
 from dmpcli.instruments.protocols import Clock, RobotMode, Sample
-from dmpcli.primitives import wrench
 
 _GRID_RATE = 100.0
 _EPS = 1e-9
-
-
-class Hand(Protocol):
-    """Whoever holds the tool."""
-
-    def wrench(self, t: float, position: Floats, rotation: Floats, velocity: Floats) -> Floats:
-        """Return the hand's wrench on the tool at the TCP, base axes, shape (6,).
-
-        `t` is the lab's clock, s; `velocity`, shape (6,), in mm/s and rad/s.
-        """
 
 
 class Lab:
@@ -56,12 +44,7 @@ class Lab:
         self._samples: list[Sample] = []
         self._streaming = False
         self._seq = 0
-        self._rng = np.random.default_rng([self.scene.seed, 0x5E])
-        self._drift = self.scene.sensor.drift * self._rng.standard_normal(6)
-        tool = self.scene.tool
-        self._load = wrench.gravity(tool.weight, tool.inclination)
-        self._sensor_in_tcp, self._lever = tool.sensor_in_tcp, tool.lever
-        self._zero = np.zeros(6) if tool.zero is None else tool.zero
+        self._wrist = Wrist(self.scene.tool, self.scene.sensor, self.scene.seed)
 
     @property
     def mode(self) -> RobotMode:
@@ -129,52 +112,12 @@ class Lab:
             self._sense(t, force)
 
     def _sense(self, t: float, force: Floats) -> None:
-        tool, sensor = self.scene.tool, self.scene.sensor
-        noise = sensor.noise * self._rng.standard_normal(6)
+        # Drawn for silent samples too: a fault changes nothing that came before it.
+        noise = self._wrist.noise()
         self._seq += 1
         if t >= self._opened + self.scene.faults.silent_at - _EPS:
             return
-        R = self.arm.rotation @ self._sensor_in_tcp
-        sensed = (
-            wrench.to_sensor(force, R, self._lever)
-            + wrench.of_weight(R, self._load, tool.centre)
-            + self._zero
-            + (t - self._opened) * self._drift
-            + noise
-        )
-        healthy = bool(np.all(np.abs(sensed) < sensor.limit))
-        read = np.clip(sensed, -sensor.limit, sensor.limit)
-        self._samples.append(Sample(t, self._seq, read, healthy, 0))
-
-
-def contact(plate: Plate | None, position: Floats, velocity: Floats) -> Floats:
-    """Wrench of the plate on the pen: spring, damper and friction; it pushes, it never pulls.
-
-    The pen touches with its tip, which is the TCP: there is no torque about it.
-
-    Parameters
-    ----------
-    plate : Plate, optional
-    position : array, shape (3,)
-        Pen tip, mm.
-    velocity : array, shape (6,)
-        mm/s and rad/s.
-
-    Returns
-    -------
-    array, shape (6,)
-        N and N·m, base axes, about the TCP.
-    """
-    force = np.zeros(6)
-    if plate is None:
-        return force
-    depth = float(plate.normal @ (plate.point - position))
-    if depth <= 0.0:
-        return force
-    away = float(plate.normal @ velocity[:3])
-    push = max(plate.stiffness * depth - plate.damping * away, 0.0)
-    along = velocity[:3] - away * plate.normal
-    speed = float(np.sqrt(along @ along))
-    rub = plate.friction * push / max(speed, plate.sliding)
-    force[:3] = push * plate.normal - rub * along
-    return force
+        sensed = self._wrist.sensed(force, self.arm.rotation, t - self._opened, noise)
+        limit = self.scene.sensor.limit
+        healthy = bool(np.all(np.abs(sensed) < limit))
+        self._samples.append(Sample(t, self._seq, np.clip(sensed, -limit, limit), healthy, 0))

@@ -104,6 +104,10 @@ class Plate:
     friction: float = 0.2
     sliding: float = 5.0
 
+    def under(self, position: Floats) -> tuple[float, Floats]:
+        """Return the depth of a point in the plate, mm, and the normal; see `wrist.Ground`."""
+        return float(self.normal @ (self.point - position)), self.normal
+
 
 @dataclass(frozen=True)
 class Sensor:

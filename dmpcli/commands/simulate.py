@@ -1,0 +1,223 @@
+"""``dmpcli simulate``: a virtual lab on loopback, to rehearse with no hardware."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dmpcli.commands.messages import tell, warn
+from dmpcli.commands.options import Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.errors import InputError
+
+if TYPE_CHECKING:
+    from dmpcli.drag.settings import RecordSettings
+    from dmpcli.instruments.virtual.faults import Faults
+    from dmpcli.instruments.virtual.hand import VisitingHand
+    from dmpcli.instruments.virtual.lab import Setting
+    from dmpcli.primitives.wrench import Tool
+
+
+CLEARANCE = 0.1
+"""mm between the parked pen and the plate: `calibrate` must touch nothing."""
+
+
+def command(
+    sensor_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Sensor box, UDP; 0 is a free one.")
+    ] = 49152,
+    http_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Its pages; 0 is a free one.")
+    ] = 8080,
+    tcp_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Its TCP interface; 0 is a free one.")
+    ] = 49151,
+    robot_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Controller, JSON-RPC; 0 is a free one.")
+    ] = 8055,
+    monitor_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Its monitor; 0 is a free one.")
+    ] = 8056,
+    host: Annotated[
+        str, typer.Option(help="Address to serve; any other than loopback opens it to a network.")
+    ] = "127.0.0.1",
+    surface: Annotated[
+        Path | None,
+        typer.Option(help="What the tool touches: plane.json, STL, OBJ or PLY; else a flat plate."),
+    ] = None,
+    surface_pose: SurfacePose = None,
+    surface_unit: SurfaceUnit = None,
+    tool: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The tool as it truly is; else a pen.")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND[=VALUE][@T]",
+            help="What goes wrong: loss, duplicate, reorder, malformed, silence, saturation, "
+            "estop, collision, mode, refuse, drop; or what the controller does: underrun, jump, "
+            "euler, newline. See docs/simulate.md.",
+        ),
+    ] = None,
+    strokes: Annotated[
+        int, typer.Option(min=0, help="How many strokes the hand draws before it stays away.")
+    ] = 1,
+    lookahead: Annotated[
+        float,
+        typer.Option(min=0.0, max=1.0, help="Of the arm that the hand has practised with, s."),
+    ] = 0.1,
+    drawn: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Keep where the hand truly drew; a demonstration file."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of hand, sensor and faults.")] = None,
+    preset: Annotated[
+        str, typer.Option(metavar="NAME|FILE.toml", help="[record]: what the hand has practised.")
+    ] = "drag",
+    config: Annotated[Path | None, typer.Option(help="TOML that beats the preset.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Of the hand's stroke with its rests, s.")
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(metavar="sine|line|circle|FILE.csv", help="What the hand draws."),
+    ] = None,
+    start: Annotated[Point | None, typer.Option(metavar="X Y Z", help="Of it, mm.")] = None,
+    goal: Annotated[Point | None, typer.Option(metavar="X Y Z", help="Of it, mm.")] = None,
+    wave_height: Annotated[
+        float | None, typer.Option(help="Of the sine, peak to trough, mm.")
+    ] = None,
+    periods: Annotated[float | None, typer.Option(help="Of the sine.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C."""
+    import time
+
+    from dmpcli.drag.loop import LONGEST_LOOKAHEAD
+    from dmpcli.drag.settings import RecordSettings, check
+    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.instruments.virtual import faults as fault_words
+    from dmpcli.instruments.virtual.lab import VirtualLab
+    from dmpcli.instruments.virtual.serving import Ports, Serving
+    from dmpcli.records import streams
+    from dmpcli.records.settings import resolve
+
+    given = {
+        "duration": duration,
+        "seed": seed,
+        "reference": reference,
+        "start": start,
+        "goal": goal,
+        "wave_height": wave_height,
+        "periods": periods,
+    }
+    settings = resolve(RecordSettings, "record", given, preset, config)
+    check(settings)
+    if lookahead > LONGEST_LOOKAHEAD:
+        warn(
+            f"--lookahead {lookahead:g}: above {LONGEST_LOOKAHEAD:g} s the drag swings to and fro, "
+            "however well the hand has practised"
+        )
+    faults = fault_words.parse(fault or ())
+    if drawn is not None:
+        streams.check_writable(drawn)
+    setting, hand = _scene(settings, faults, tool, strokes, lookahead)
+    if surface is not None:
+        setting = _on(surface, surface_pose, surface_unit, setting, quiet)
+    elif surface_pose is not None or surface_unit is not None:
+        raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
+    ports = Ports(sensor_port, http_port, tcp_port, robot_port, monitor_port)
+    with Interruption() as signals:
+        with Serving(VirtualLab(setting, hand), faults, host, ports, settings.seed) as serving:
+            line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
+            print(line, flush=True)  # noqa: T201
+            tell("serving; Ctrl-C ends it", quiet)
+            while signals.number is None:
+                time.sleep(0.1)
+        if drawn is not None and hand.track:
+            streams.write(drawn, _track(hand, settings))
+        tell(f"strokes drawn by the hand: {hand.drawn}", quiet)
+    raise typer.Exit(128 + signals.number)
+
+
+def _scene(
+    settings: "RecordSettings", faults: "Faults", tool: Path | None, strokes: int, lookahead: float
+) -> "tuple[Setting, VisitingHand]":
+    """Lay the plate under the stroke, park the pen over it, and call the hand that draws it."""
+    from dmpcli.drag import references, rehearsal
+    from dmpcli.instruments.mock import PEN
+    from dmpcli.instruments.virtual.hand import VisitingHand
+    from dmpcli.instruments.virtual.joint_arm import LAG
+    from dmpcli.instruments.virtual.lab import Setting
+
+    stroke = references.build(settings)
+    scene = rehearsal.scene(stroke, settings)
+    # A set-point waits for its turn, then in the buffer, and the servos lag behind it.
+    delay = 1.0 / settings.control_rate + lookahead + LAG
+    tutor, lead_in = rehearsal.practised(stroke, scene.rotation, settings, delay)
+    setting = Setting(
+        position=scene.position + CLEARANCE * stroke.normal,
+        rotation=scene.rotation,
+        tool=PEN if tool is None else _weighed(tool),
+        ground=scene.plate,
+        habits=faults.habits,
+        events=faults.events,
+        seed=settings.seed,
+    )
+    return setting, VisitingHand(tutor, stroke.start, lead_in + tutor.duration, strokes)
+
+
+def _weighed(path: Path) -> "Tool":
+    """Read a tool whose weight is known: what hangs on a simulated sensor must weigh something."""
+    from dmpcli.records import streams
+    from dmpcli.records import tool as tool_file
+
+    source = streams.read(path)
+    try:
+        return tool_file.decode(source)
+    except InputError:
+        tool_file.geometry(source)  # anything else that is wrong with it is told first
+        raise InputError(
+            f"--tool {path}: needs a weight: give payload with weight and centre_of_mass, as in "
+            "sample_runs/pen.json"
+        ) from None
+
+
+def _on(
+    path: Path, pose: str | None, unit: str | None, setting: "Setting", quiet: bool
+) -> "Setting":
+    """Put a surface in the place of the plate."""
+    from dataclasses import replace
+
+    from dmpcli.instruments.virtual.part import facing
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import streams
+    from dmpcli.records import surface as surface_file
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.plane import Plane
+    from dmpcli.surfaces.protocol import Surface
+
+    placed = None if pose is None else pose_file.parse(pose, "--surface-pose")[0]
+    found = surface_file.load(streams.read(path), unit, placed)
+    shape: Surface
+    if isinstance(found, Plane):
+        shape = found
+    else:
+        for remark in found.remarks:
+            tell(f"{path}: {remark}", quiet)
+        shape = Mesh(found.V, found.F)
+    return replace(setting, ground=facing(shape, setting.position, setting.rotation[:, 2]))
+
+
+def _track(hand: "VisitingHand", settings: "RecordSettings") -> bytes:
+    """What the hand drew, as a demonstration file."""
+    import numpy as np
+
+    from dmpcli.records.record import Provenance, Record, encode
+    from dmpcli.records.schemas import DEMONSTRATION
+    from dmpcli.rotations import to_euler
+
+    times, positions, rotations = (np.array(each) for each in zip(*hand.track, strict=True))
+    rows = np.column_stack([times - times[0], positions, to_euler(rotations)])
+    columns = dict(zip(("t", "x", "y", "z", "rx", "ry", "rz"), rows.T, strict=True))
+    options = settings.model_dump(mode="json")
+    return encode(Record(DEMONSTRATION, columns, Provenance("simulate", options=options)))
