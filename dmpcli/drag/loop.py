@@ -1,11 +1,14 @@
 """The control loop of ``record``: sensor → compensation → admittance → servo, and the log.
 
-Deadlines are absolute. The loop stops by itself where going on would not be safe: a silent or
-saturated sensor, a robot that is not ready, refuses a set-point, does not follow or leaves the
-workspace, a loop that is late. Whatever ends it, the arm is stopped and the log is there.
+Deadlines are absolute. A controller that queues set-points goes on while a deadline is missed, and
+gets those that it is owed with the next one. The loop stops by itself where going on would not be
+safe: a silent or saturated sensor, a robot that is not ready, refuses a set-point, does not follow
+or leaves the workspace, a loop that is late. Whatever ends it, the arm is stopped and the log is
+there.
 """
 
 import math
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -17,6 +20,7 @@ from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import guards
 from dmpcli.instruments.guards import Trail
 from dmpcli.instruments.interruption import Interruption
+from dmpcli.instruments.pace import Pace, undisturbed
 from dmpcli.instruments.protocols import (
     Clock,
     DragTeaching,
@@ -26,6 +30,7 @@ from dmpcli.instruments.protocols import (
     Servo,
     ServoInfo,
 )
+from dmpcli.instruments.rest import Rest
 from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives.admittance import Pose, brake, move
 from dmpcli.primitives.compensation import Compensation, LowPass, dead_band
@@ -34,12 +39,13 @@ from dmpcli.primitives.wrench import Tool
 STILL = 0.5
 """mm: a tool that stays within this of one point is at rest."""
 
+LONGEST_LOOKAHEAD = 0.15
+"""s: an arm that lags by more makes the hand and the admittance model swing against each other."""
+
 MOVED = 2.0
 """mm: a tool that has been further than this from where it began has moved."""
 
 DEFECT = "a defect of dmpcli"
-
-_BRAKING_TIME = 2.0
 
 
 @dataclass(frozen=True)
@@ -49,16 +55,13 @@ class Ending:
     Attributes
     ----------
     reason : str
-        ``duration``, ``rest``, ``asked``, or what failed.
+        ``duration``, ``rest``, ``asked``, the signal that came, or what failed.
     failure : DmpError or None
         What the command shall end with once the recording is kept.
-    missed : int
-        Deadlines that passed without a cycle.
     """
 
     reason: str
     failure: DmpError | None = None
-    missed: int = 0
 
     def unless(self, failure: DmpError | None) -> "Ending":
         """Return an ending with this failure; the first one that came is the one told."""
@@ -89,11 +92,18 @@ class Recorder:
         Called with the time from which the tool can be dragged, s.
     lead_in : float
         How long it is dragged before the recording begins, s.
+    hindrance : callable, optional
+        Read once a cycle; what it returns brakes the tool and is what the recording ends with.
+    remark : callable, optional
+        Told, before anything moves, what is odd about the instruments.
 
     Attributes
     ----------
     log : Log
         It is there whatever goes wrong.
+    pace : Pace
+    sensor_info : SensorInfo
+        What the sensor said of itself, once `run` has opened it.
     """
 
     def __init__(
@@ -108,18 +118,20 @@ class Recorder:
         asked_to_end: Callable[[], bool] = lambda: False,
         begin: Callable[[float], None] = lambda _: None,
         lead_in: float = 0.0,
+        hindrance: Callable[[], DmpError | None] = lambda: None,
+        remark: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._robot, self._sensor, self._clock = robot, sensor, clock
         self._tool, self._settings = tool, settings
         self._longest, self._asked_to_end, self._begin = longest, asked_to_end, begin
         self._interruption = interruption or Interruption()
-        self._lead_in = lead_in
+        self._lead_in, self._hindrance, self._remark = lead_in, hindrance, remark
         self._law, self._bounds = settings.law, settings.bounds
         self._period = self._law.period
         self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
         self._wrench = np.zeros(6)
-        self._missed = 0
-        self.log = Log()
+        self.log = Log(referred=settings.drag == "admittance")
+        self.pace = Pace()
 
     def run(self) -> Ending:
         """Record until the end; the instruments are closed after.
@@ -132,16 +144,23 @@ class Recorder:
         Raises
         ------
         InputError
-            A rate does not suit the instruments.
+            A rate does not suit the instruments, or the robot takes no set-points.
         RefusedError
             The robot is not ready.
         InstrumentError
             An instrument cannot be reached or started.
         """
         closing = None
+        guards.check_streams(self._robot)
         try:
             servo, info = self._robot.open(), self._sensor.open()
+            self.sensor_info = info
             self._check_rates(servo, info)
+            if self._settings.drag == "admittance" and servo.lookahead > LONGEST_LOOKAHEAD:
+                self._remark(
+                    f"robot: lags by its look-ahead of {servo.lookahead:g} s, and above "
+                    f"{LONGEST_LOOKAHEAD:g} s the drag swings to and fro; shorten lookahead"
+                )
             self._sensor.start(self._settings.sensor_rate)
             state = self._robot.state()
             guards.check_state(state, self._settings.workspace)
@@ -169,57 +188,86 @@ class Recorder:
     def _drag(self, state: RobotState, servo: ServoInfo, info: SensorInfo) -> Ending:
         s = self._settings
         self._sensing = Sensing(self._sensor, info, s.sensor_rate, self._period, self._clock)
-        tool = self._sensing.zeroed(self._tool, state.rotation, s.bias_time)
+        tool = self._sensing.zeroed(self._tool, state.rotation, s.bias_time, s.tool_check)
         self._compensate = Compensation(tool)
         self._servo = servo
         self._trail = Trail(servo, self._period, s.following_error, s.following_angle)
         reason, failure, stopping = DEFECT, None, None
         try:
-            reason = self._cycles(Pose(state.position, state.rotation, np.zeros(6)))
+            with undisturbed():
+                reason = self._cycles()
+            failure = self._hindrance()
         except (InstrumentError, RefusedError) as error:
             reason, failure = str(error), error
         finally:
             # Also on a defect of ours: nothing may leave the arm moving.
             stopping = guards.leave(self._robot.stop)
-        return Ending(reason, failure, self._missed).unless(stopping)
+        return Ending(reason, failure).unless(stopping)
 
-    def _cycles(self, home: Pose) -> str:
+    def _cycles(self) -> str:
         """Run the loop to its end and the tool to rest; return why it ended."""
-        if self._interruption.count:
-            return "asked"
-        reference: Pose | None = home
-        if self._settings.drag == "builtin" and isinstance(self._robot, DragTeaching):
-            self._robot.drag()
-            reference = None
-        else:
-            self._robot.start(self._period)
-        start = self._clock.now()
+        before = "before anything moved"
+        if self._interruption.count > 0:
+            return self._signalled(before)
+        home = reference = self._started()
+        # Servos may take seconds to come on: what was felt meanwhile is past, but it is checked.
+        self._sensing.hear(self._clock.now())
+        if self._interruption.count > 0:
+            return self._signalled(before)
+        start = self._start = self._clock.now()
+        self._cycle = self._missed = 0
         self._last = start - self._period
         self._begin(start)
-        cycle = 0
         while True:
+            due, woke = start + self._cycle * self._period, self._clock.now()
             state = self._checked_state(reference)
             fresh = self._feel(self._clock.now(), state)
-            if reference is not None:
-                reference = (
-                    move(self._law, reference, self._wrench, home, self._bounds)
-                    if fresh
-                    else brake(self._law, reference, self._bounds)
-                )
-                self._send(reference)
+            if reference is not None and home is not None:
+                reference = self._lead(reference, home if fresh else None)
+            sent = self._clock.now()
             t = state.t - start - self._lead_in
-            if t > -0.5 * self._period:
+            # Where the robot has told nothing new since the last cycle there is no new row.
+            if t > -0.5 * self._period and not (len(self.log) and round(t, 9) <= self.log.duration):
                 self.log.add(t, state, reference, self._wrench, self._sensing.newest)
             reason = self._reason_to_end(t)
             if reason is not None:
-                self._come_to_rest(reference)
-                return reason
-            cycle += 1
-            # A loop that is late waits for the next deadline; it never sends a burst.
-            due = math.ceil((self._clock.now() - start) / self._period - 1e-6)
-            self._missed += max(due - cycle, 0)
-            cycle = max(due, cycle)
-            self._clock.sleep_until(start + cycle * self._period)
+                rested = self._come_to_rest(reference)
+                return self._signalled(rested) if self._interruption.count else reason
+            self.pace.add(due, woke, sent, self._clock.now())
+            self._wait()
+
+    def _started(self) -> Pose | None:
+        """Enter servo mode; return where the tool is then, or None where no reference leads it."""
+        if self._settings.drag == "builtin" and isinstance(self._robot, DragTeaching):
+            self._robot.drag()
+            return None
+        self._robot.start(self._period)
+        # Not before: it may have been moved since, and arms sink as their brakes are released.
+        state = self._robot.state()
+        guards.check_state(state, self._settings.workspace)
+        return Pose(state.position, state.rotation, np.zeros(6))
+
+    def _wait(self) -> None:
+        """Sleep until the next deadline; those that have passed by now are missed."""
+        since = self._clock.now() - self._start
+        following = math.ceil(since / self._period - 1e-6)
+        self._missed = max(following - self._cycle - 1, 0)
+        self.pace.missed += self._missed
+        self._cycle += 1 + self._missed
+        self._clock.sleep_until(self._start + self._cycle * self._period)
+
+    def _lead(self, reference: Pose, home: Pose | None) -> Pose:
+        """Send the next set-point, and before it those that a queue is owed; return it.
+
+        Each is a step of one period; without `home`, from which the spring pulls, it brakes.
+        """
+        for _ in range(1 + (self._missed if self._servo.queues else 0)):
+            if home is None:
+                reference = brake(self._law, reference, self._bounds)
+            else:
+                reference = move(self._law, reference, self._wrench, home, self._bounds)
+            self._send(reference)
+        return reference
 
     def _checked_state(self, reference: Pose | None) -> RobotState:
         """Read the arm's state at the head of a cycle; raise where it must not go on."""
@@ -237,7 +285,9 @@ class Recorder:
         """Take in the new samples; False when the newest is too old to be believed."""
         s = self._settings
         for sample in self._sensing.hear(now):
-            felt = self._low_pass(self._compensate(sample.wrench, state.rotation))
+            external = self._compensate(sample.wrench, state.rotation)
+            guards.check_wrench(external, s.max_force, s.max_torque)
+            felt = self._low_pass(external)
             self._wrench = dead_band(felt, s.dead_band_force, s.dead_band_torque)
         fresh = self._sensing.fresh(now)
         if not fresh:
@@ -254,6 +304,9 @@ class Recorder:
         self._trail.add(position, rotation)
 
     def _reason_to_end(self, t: float) -> str | None:
+        hindrance = self._hindrance()
+        if hindrance is not None:
+            return str(hindrance)
         if self._interruption.count or self._asked_to_end():
             return "asked"
         if t >= self._longest - 0.5 * self._period:
@@ -268,14 +321,20 @@ class Recorder:
             return "rest"
         return None
 
-    def _come_to_rest(self, reference: Pose | None) -> None:
-        """Brake within the bounds; a second signal stops at once."""
-        for _ in range(1, round(_BRAKING_TIME / self._period)):
-            if reference is None or not reference.velocity.any():
-                break
-            self._clock.sleep_until(self._last + self._period)
+    def _signalled(self, how: str) -> str:
+        number = self._interruption.number
+        return f"{signal.Signals(number).name if number else 'signal'}: stopped {how}"
+
+    def _come_to_rest(self, reference: Pose | None) -> str:
+        """Brake within the bounds, and wait for the arm; a second signal stops at once."""
+        rest = Rest(self._servo, self._period)
+        while reference is not None:
+            self._wait()
             if self._interruption.count > 1:
+                return "at once at the second signal"
+            state = self._checked_state(reference)
+            self._feel(self._clock.now(), state)
+            reference = self._lead(reference, None)
+            if not reference.velocity.any() and rest.reached(state):
                 break
-            self._checked_state(reference)
-            reference = brake(self._law, reference, self._bounds)
-            self._send(reference)
+        return "after braking to rest"

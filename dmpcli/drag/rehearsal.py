@@ -1,15 +1,19 @@
 """The mock experiment: plate, pen and practised hand around one reference stroke."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmpcli.arrays import Floats
 from dmpcli.drag.references import DURATION, Reference
 from dmpcli.drag.settings import RecordSettings
 from dmpcli.drag.tutor import HandParameters, Tutor, stroke_time
 from dmpcli.errors import InputError
 from dmpcli.instruments.mock import Lab, Plate, Scene
+
+DELAY = 0.05
+"""Of the mock's arm: one servo period and its lag, s."""
 
 # The hand takes hold where the pen stands; further away it would tug the pen over the plate.
 _REACH = 10.0
@@ -85,15 +89,38 @@ def rehearse(lab: Lab | None, reference: Reference, settings: RecordSettings) ->
             f"--robot: the mock's pen stands {away:.1f} mm from the start of the stroke; "
             "leave x, y, z out of the URL, or give --start"
         )
-    hand = HandParameters()
-    _check_speed(reference, settings, hand)
-    duration = settings.duration or DURATION + 2.0 * hand.rest
-    tutor = Tutor(reference, lab.arm.rotation, duration, settings, hand)
+    tutor, lead_in = practised(reference, lab.arm.rotation, settings)
     lab.hand = tutor
-    longest = duration
+    longest = tutor.duration
     if settings.duration is None and settings.until_rest is not None:
         longest += settings.until_rest + _SETTLING
-    return Rehearsal(tutor.begin, hand.lead_in, longest)
+    return Rehearsal(tutor.begin, lead_in, longest)
+
+
+def practised(
+    reference: Reference, rotation: Floats, settings: RecordSettings, delay: float = DELAY
+) -> tuple[Tutor, float]:
+    """Return a hand that has practised the stroke, and how long it takes to set the pen down, s.
+
+    Parameters
+    ----------
+    reference : Reference
+    rotation : array, shape (3, 3)
+        Attitude that the hand keeps.
+    settings : RecordSettings
+    delay : float
+        Of the arm behind its set-points, which the hand has learnt, s.
+
+    Raises
+    ------
+    InputError
+        The stroke needs more speed than the reference may have.
+    """
+    hand = HandParameters()
+    hand = replace(hand, preview=hand.preview + delay - DELAY)
+    _check_speed(reference, settings, hand)
+    duration = settings.duration or DURATION + 2.0 * hand.rest
+    return Tutor(reference, rotation, duration, settings, hand), hand.lead_in
 
 
 def _check_speed(reference: Reference, settings: RecordSettings, hand: HandParameters) -> None:

@@ -51,6 +51,11 @@ class RecordSettings(Settings):
     # and a tenth of a second; the built-in drag has no set-points, only the workspace counts.
     following_error: Annotated[Positive, Field(description="mm")] = 5.0
     following_angle: Annotated[Positive, Field(description="rad")] = 0.1
+    max_force: Annotated[Positive, Field(description="N, of the hand and the work")] = 100.0
+    max_torque: Annotated[Positive, Field(description="N·m, at the TCP")] = 10.0
+    # What a known zero may miss at rest: half as much again as the dead-band, beyond which the arm
+    # creeps with nobody at it. A zero that drifts by 2 mN/s gets there in twelve minutes.
+    tool_check: Annotated[Positive, Field(description="N, and N·m at 0.1 m")] = 1.5
     workspace: Annotated[Workspace | None, Field(description="box for the TCP, mm")] = None
 
     # The recording.

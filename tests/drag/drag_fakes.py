@@ -1,5 +1,8 @@
 """Recordings with the mock lab, and instruments that do exactly what a test tells them."""
 
+from collections import deque
+from dataclasses import replace
+
 import numpy as np
 
 from dmpcli.drag import references, rehearsal
@@ -103,3 +106,49 @@ class FakeServo:
 
     def close(self):
         self.calls.append("close")
+
+
+class QueueServo(FakeServo):
+    """Queues set-points for one look-ahead, and takes one out each period by its own clock.
+
+    `level` is what the queue holds when it is left, `speed` how fast the arm moves then, mm/s.
+    """
+
+    def __init__(self, clock, lookahead=0.1):
+        super().__init__(clock, lookahead)
+        self.queue, self.dry, self.level, self.speed = deque(), 0, None, None
+        self.before = self.position
+
+    def open(self):
+        return replace(super().open(), queues=True)
+
+    def start(self, period):
+        super().start(period)
+        self.period, self.taken = period, self.clock.now()
+        self.queue.extend([(self.position, self.rotation)] * round(self.lookahead / period))
+
+    def send(self, position, rotation):
+        self._run()
+        self.sent.append((self.clock.now(), position))
+        self.queue.append((position, rotation))
+        return True
+
+    def state(self):
+        self._run()
+        return super().state()
+
+    def stop(self):
+        if self.level is None:
+            self._run()
+            self.level = len(self.queue)
+            self.speed = np.linalg.norm(self.position - self.before) / self.period
+        super().stop()
+
+    def _run(self):
+        while "start" in self.calls and self.taken + self.period <= self.clock.now() + 1e-9:
+            self.taken += self.period
+            self.before = self.position
+            if self.queue:
+                self.position, self.rotation = self.queue.popleft()
+            else:
+                self.dry += 1

@@ -9,7 +9,7 @@ from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.mock import PEN
-from tests.drag.drag_fakes import FakeSensor, FakeServo, drag_settings
+from tests.drag.drag_fakes import FakeSensor, FakeServo, QueueServo, drag_settings
 
 # A sensor in the TCP with nothing on it senses the wrench that moves the tool.
 WEIGHTLESS = replace(PEN, tcp_position=PEN.sensor_position, weight=0.0, zero=np.zeros(6))
@@ -19,13 +19,19 @@ BEGAN = 0.1
 
 
 def bench(
-    longest=2.0, asked_to_end=lambda: False, tool=WEIGHTLESS, clock=None, signals=None, **options
+    longest=2.0,
+    asked_to_end=lambda: False,
+    tool=WEIGHTLESS,
+    clock=None,
+    signals=None,
+    kind=FakeServo,
+    **options,
 ):
     clock = clock or SimulatedClock()
-    sensor, servo = FakeSensor(clock), FakeServo(clock)
-    recorder = Recorder(
-        servo, sensor, clock, tool, drag_settings(**options), longest, signals, asked_to_end
-    )
+    sensor, servo = FakeSensor(clock), kind(clock)
+    # Pulled from the first sample on, the tool would be taken for another one.
+    settings = drag_settings(**{"tool_check": 1000.0} | options)
+    recorder = Recorder(servo, sensor, clock, tool, settings, longest, signals, asked_to_end)
     return recorder, sensor, servo
 
 
@@ -33,7 +39,7 @@ def test_the_recording_lasts_as_long_as_asked_one_row_per_cycle():
     recorder, sensor, servo = bench(longest=2.0)
     ending = recorder.run()
     columns = recorder.log.columns()
-    assert (ending.reason, ending.failure, ending.missed) == ("duration", None, 0)
+    assert (ending.reason, ending.failure, recorder.pace.missed) == ("duration", None, 0)
     np.testing.assert_array_equal(columns["t"], np.round(np.arange(101) * 0.02, 9))
     assert servo.calls[0] == "open"
     assert servo.calls[-2:] == ["stop", "close"]
@@ -64,6 +70,141 @@ def test_the_tool_slows_to_rest_before_the_servo_is_left():
     assert len(after) > 10
     np.testing.assert_allclose(np.diff(after), -200.0 * 0.02, atol=4.1)
     assert after[-1] == pytest.approx(0.0, abs=4.0)
+
+
+@pytest.mark.parametrize(
+    ("lookahead", "drag", "told"),
+    [(0.15, "admittance", False), (0.2, "admittance", True), (0.2, "builtin", False)],
+)
+def test_an_arm_that_lags_much_is_told_of_before_it_moves(lookahead, drag, told):
+    class Led(FakeServo):
+        def drag(self):
+            self.calls.append("drag")
+
+    recorder, _, servo = bench(longest=0.1, drag=drag, kind=lambda clock: Led(clock, lookahead))
+    remarks = []
+    recorder._remark = lambda text: remarks.append((text, len(servo.sent)))
+    recorder.run()
+    assert bool(remarks) is told
+    assert all("look-ahead of 0.2 s" in text and sent == 0 for text, sent in remarks)
+
+
+@pytest.mark.parametrize("lookahead", [0.1, 0.5])
+def test_what_a_queue_still_holds_of_the_braking_is_not_cut_off(lookahead):
+    recorder, sensor, servo = bench(longest=1.0, kind=lambda clock: QueueServo(clock, lookahead))
+    sensor.wrench = lambda t: 4 * PULL
+    assert recorder.run().failure is None
+    assert servo.speed == pytest.approx(0.0, abs=0.1)
+    np.testing.assert_allclose(servo.position, servo.sent[-1][1], atol=1e-9)
+    assert servo.position[0] > 20.0
+
+
+def test_an_arm_that_does_not_come_to_rest_is_told():
+    recorder, _, servo = bench(longest=0.5)
+    read = servo.state
+
+    def swinging():
+        state = read()
+        away = np.array([np.sin(20.0 * state.t), 0.0, 0.0])
+        return replace(state, position=state.position + away)
+
+    servo.state = swinging
+    ending = recorder.run()
+    assert isinstance(ending.failure, InstrumentError)
+    assert "does not come to rest" in ending.reason
+    assert servo.calls[-2:] == ["stop", "close"]
+
+
+@pytest.mark.parametrize("kind", [QueueServo, FakeServo])
+def test_a_queue_gets_the_set_points_that_it_is_owed_and_no_other_arm_does(kind):
+    class Oversleeping(SimulatedClock):
+        def sleep_until(self, t):
+            # Once a second, by more than a period.
+            super().sleep_until(t + (0.025 if 0.01 < t % 1.0 < 0.03 else 0.0))
+
+    recorder, sensor, servo = bench(longest=20.0, clock=Oversleeping(), kind=kind)
+    sensor.wrench = lambda t: PULL
+    assert recorder.run().reason == "duration"
+    assert recorder.pace.missed >= 19
+    times, places = [t for t, _ in servo.sent], np.array([p[0] for _, p in servo.sent])
+    elapsed = round((times[-1] - times[0]) / 0.02) + 1
+    owed = recorder.pace.missed if kind is QueueServo else 0
+    assert len(places) == elapsed - recorder.pace.missed + owed
+    # Every step is one that the admittance makes in a period: none is faster than the steady drag.
+    assert np.diff(places).max() <= 0.02 * (4.0 / 0.08) + 1e-6
+    if kind is QueueServo:
+        assert servo.dry == 0
+        assert servo.level >= 4
+
+
+def test_a_tool_that_moved_while_the_servos_came_on_is_led_from_where_it_is():
+    recorder, _, servo = bench(longest=1.0)
+    begin = servo.start
+
+    def start(period):
+        begin(period)
+        servo.position = np.array([0.0, 0.0, -30.0])
+
+    servo.start = start
+    assert recorder.run().reason == "duration"
+    places = np.array([p for _, p in servo.sent])
+    np.testing.assert_allclose(places - [0.0, 0.0, -30.0], 0.0, atol=1e-9)
+
+
+def test_a_tool_that_left_the_workspace_while_the_servos_came_on_is_not_led():
+    recorder, _, servo = bench(longest=1.0, workspace=(-9.0, 9.0, -9.0, 9.0, -9.0, 9.0))
+    begin = servo.start
+
+    def start(period):
+        begin(period)
+        servo.position = np.array([0.0, 0.0, -30.0])
+
+    servo.start = start
+    assert "leaves the workspace" in recorder.run().reason
+    assert servo.sent == []
+    assert servo.calls[-2:] == ["stop", "close"]
+
+
+def test_a_signal_while_the_servos_come_on_lets_no_motion_begin():
+    signals = Interruption()
+    recorder, _, servo = bench(signals=signals)
+    begin = servo.start
+
+    def start(period):
+        begin(period)
+        signals.receive(signal.SIGINT)
+
+    servo.start = start
+    assert recorder.run().reason == "SIGINT: stopped before anything moved"
+    assert servo.sent == []
+    assert servo.calls[-2:] == ["stop", "close"]
+
+
+def test_what_was_felt_while_the_servos_came_on_is_checked_and_then_forgotten():
+    recorder, sensor, servo = bench(longest=1.0)
+    begin = servo.start
+
+    def start(period):
+        begin(period)
+        servo.clock.sleep_until(5.0)
+
+    servo.start = start
+    sensor.wrench = lambda t: 4 * PULL if 1.0 < t < 4.9 else np.zeros(6)
+    assert recorder.run().reason == "duration"
+    np.testing.assert_array_equal(recorder.log.columns()["fx"], 0.0)
+    recorder, sensor, servo = bench(longest=1.0)
+    begin, servo.start = servo.start, start
+    sensor.wrench = lambda t: np.full(6, np.nan) if 2.0 < t < 2.1 else np.zeros(6)
+    assert "not a number" in recorder.run().reason
+    assert servo.sent == []
+
+
+def test_a_robot_that_only_plays_whole_plans_is_refused_before_it_is_opened():
+    recorder, _, servo = bench()
+    servo.upload = servo.play = lambda *_: None
+    with pytest.raises(InputError, match="mode=file only plays whole plans; leave it out"):
+        recorder.run()
+    assert servo.calls == []
 
 
 def test_silence_for_two_cycles_brakes_and_for_a_tenth_of_a_second_stops():
@@ -199,7 +340,7 @@ def test_a_late_loop_skips_cycles_and_never_sends_a_burst():
 
     recorder, _, servo = bench(longest=2.0, clock=Oversleeping())
     ending = recorder.run()
-    assert ending.missed == 3
+    assert (ending.reason, recorder.pace.missed) == ("duration", 3)
     assert np.diff([t for t, _ in servo.sent]).min() > 0.009
 
 
@@ -261,7 +402,8 @@ def test_a_signal_brakes_and_a_second_one_stops_at_once(signals_sent):
 
     servo.state = state
     ending = recorder.run()
-    assert (ending.reason, ending.failure) == ("asked", None)
+    how = "after braking to rest" if signals_sent == 1 else "at once at the second signal"
+    assert (ending.reason, ending.failure) == (f"SIGINT: stopped {how}", None)
     assert len(recorder.log) == 47
     braking = [t for t, _ in servo.sent if t > 1.03]
     assert (len(braking) > 10) == (signals_sent == 1)
@@ -272,7 +414,7 @@ def test_a_signal_before_the_motion_lets_none_begin():
     signals = Interruption()
     signals.receive(signal.SIGTERM)
     recorder, _, servo = bench(signals=signals)
-    assert recorder.run().reason == "asked"
+    assert recorder.run().reason == "SIGTERM: stopped before anything moved"
     assert "start" not in servo.calls
     assert not servo.sent
 
@@ -378,3 +520,38 @@ def test_a_robot_without_drag_teaching_cannot_be_dragged_by_its_own():
     recorder, _, _ = bench(drag="builtin")
     with pytest.raises(InputError, match="no drag teaching"):
         recorder.run()
+
+
+def test_a_hindrance_brakes_and_is_what_the_recording_ends_with():
+    full = InstrumentError("demo.journal: No space left on device")
+    clock = SimulatedClock()
+    sensor, servo = FakeSensor(clock), FakeServo(clock)
+    recorder = Recorder(
+        servo,
+        sensor,
+        clock,
+        WEIGHTLESS,
+        drag_settings(),
+        5.0,
+        hindrance=lambda: full if clock.now() > 1.0 else None,
+    )
+    ending = recorder.run()
+    assert ending.failure is full
+    assert ending.reason == str(full)
+    assert len(recorder.log) == 47
+
+
+@pytest.mark.parametrize(
+    ("wrench", "words"),
+    [
+        (np.array([0.0, 21.0, 0.0, 0.0, 0.0, 0.0]), "force 21 N on the tool is over 20 N"),
+        (np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.1]), "torque 2.1 N·m on the tool is over 2 N·m"),
+    ],
+)
+def test_more_force_or_torque_than_the_tool_may_meet_stops(wrench, words):
+    recorder, sensor, servo = bench(max_force=20.0, max_torque=2.0)
+    sensor.wrench = lambda t: wrench if t > 1.0 else np.zeros(6)
+    ending = recorder.run()
+    assert isinstance(ending.failure, RefusedError)
+    assert words in ending.reason
+    assert servo.sent[-1][0] <= 1.02

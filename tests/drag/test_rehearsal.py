@@ -173,7 +173,8 @@ def test_a_wrong_weight_in_the_tool_file_makes_the_tool_sink():
     clock = SimulatedClock()
     lab = Lab(clock, Scene(position=np.zeros(3)))
     heavy = replace(PEN, weight=PEN.weight - 3.0)
-    recorder = Recorder(MockServo(lab), MockSensor(lab), clock, heavy, drag_settings(), 5.0)
+    settings = drag_settings(tool_check=5.0)
+    recorder = Recorder(MockServo(lab), MockSensor(lab), clock, heavy, settings, 5.0)
     recorder.run()
     assert positions(recorder)[1][-1, 2] < -5.0
 

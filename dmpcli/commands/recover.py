@@ -1,0 +1,69 @@
+"""``dmpcli recover``: turn the journal of a run that did not end into its proper file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dmpcli.commands.messages import tell
+from dmpcli.commands.options import Quiet
+from dmpcli.errors import InputError, counted
+
+if TYPE_CHECKING:
+    from dmpcli.records.journal import Found
+    from dmpcli.records.record import Record
+
+
+def command(
+    journal: Annotated[
+        str, typer.Argument(metavar="JOURNAL", help="What the crash left; - is stdin.")
+    ],
+    output: Annotated[
+        str, typer.Option("--output", "-o", help="Demonstration or run; - is stdout.")
+    ],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make the file that a crash kept `record` or `execute` from writing."""
+    from dmpcli.records import journal as journals
+    from dmpcli.records import record, streams
+
+    streams.check_writable(output)
+    if output != streams.DASH and Path(output).is_file() and not force:
+        raise InputError(f"{output}: exists; choose another name, or give --force")
+    found = journals.read(streams.read(journal, journal=True))
+    whole = _record(found)
+    streams.write(output, record.encode(whole))
+    tell(_summary(output, journal, found, whole), quiet)
+
+
+def _record(found: "Found") -> "Record":
+    """Return the proper file's record; a run that came to its end gives the very same file."""
+    from dataclasses import replace
+
+    from dmpcli.drag import log
+    from dmpcli.records.record import Record
+    from dmpcli.records.schemas import DEMONSTRATION
+    from dmpcli.streaming import run_file
+
+    drags = found.schema is DEMONSTRATION
+    columns = log.columns(found.rows) if drags else run_file.columns(found.rows)
+    facts = found.provenance.facts
+    if not found.whole:
+        options = found.provenance.options
+        facts = facts | (log.recovered() if drags else run_file.recovered(columns, options))
+        seconds = float(columns["t"][-1])
+        facts = facts | {"recovered": {"rows": len(found.rows), "seconds": seconds}}
+    return Record(found.schema, columns, replace(found.provenance, facts=facts))
+
+
+def _summary(output: str, journal: str, found: "Found", whole: "Record") -> str:
+    from dmpcli.records import streams
+
+    state = "all of the run" if found.whole else "as far as the journal goes"
+    cut = f"; {found.unread} bytes of a broken end left out" if found.unread else ""
+    last = "" if journal == streams.DASH else f"; {journal} may be removed"
+    return (
+        f"{streams.shown(output, output=True)}: {counted(len(whole), 'row')}, {whole.t[-1]:.2f} s, "
+        f"{state}{cut}{last}"
+    )
