@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.instruments.mock import PEN
+from dmpcli.primitives.identification import Identification, Payload
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import tool
 from dmpcli.records.streams import Source
@@ -54,8 +56,73 @@ def test_a_tool_survives_its_file(seed, zeroed):
         np.testing.assert_array_equal(after.zero, before.zero)
 
 
+def identified():
+    payload = Payload(6.0, np.array([1.0, -2.0, 45.0]), np.array([0.01, 0.0]), np.arange(6.0))
+    error = Payload(0.01, np.full(3, 0.1), np.full(2, 0.001), np.full(6, 0.01))
+    used = np.array([True, True, False, True])
+    return Identification(payload, error, np.zeros((4, 6)), np.array([2.4, 3.2]), used)
+
+
+def calibrated(**sensor):
+    identity = tool.SensorIdentity(**sensor) if sensor else None
+    return tool.calibrated(identified(), identity, {"poses": 4}, [])
+
+
 def test_the_file_obeys_its_published_schema():
-    jsonschema.validate(json.loads(TEXT), tool.schema())
+    whole = json.loads(tool.encode(PEN, calibrated(make="mock", serial="7")))
+    for document in (json.loads(TEXT), whole, json.loads(GEOMETRY.content)):
+        jsonschema.validate(document, tool.schema())
+
+
+GEOMETRY = changed(payload=None, calibration=None)
+
+
+def test_a_calibrated_tool_knows_its_sensor_and_how_it_was_found():
+    content = tool.encode(PEN, calibrated(make="ATI", product="Mini45", serial="FT1"))
+    assert tool.decode(Source("pen.json", content)).sensor == "ATI Mini45 FT1"
+    said = json.loads(content)["calibration"]
+    assert said["poses"] == 3
+    assert said["rejected"] == [3]
+    assert said["conditioning"] == {"force": 2.4, "torque": 3.2}
+    assert said["standard_errors"]["centre_of_mass"] == [0.1, 0.1, 0.1]
+    assert tool.decode(Source("pen.json", TEXT)).sensor == ""
+
+
+def test_a_file_without_payload_is_a_geometry():
+    found = tool.geometry(GEOMETRY)
+    np.testing.assert_array_equal(found.tcp_position, PEN.tcp_position)
+    np.testing.assert_array_equal(tool.geometry(Source("a", TEXT)).lever, PEN.lever)
+    assert (found.weight, found.zero) == (0.0, None)
+
+
+def test_the_first_version_is_read():
+    assert tool.decode(changed(version=1, calibration=None)).weight == PEN.weight
+
+
+@given(st.integers(0, 1000))
+def test_the_geometry_survives_the_facts_of_another_file(seed):
+    rng = np.random.default_rng(seed)
+    before = replace(
+        PEN, sensor_rotation=exp(rng.standard_normal(3)), tcp_position=rng.standard_normal(3)
+    )
+    facts = {"geometry": tool.transforms(before), "sensor": {"make": "mock"}}
+    after, sensor = tool.restored(facts, "poses.parquet")
+    np.testing.assert_allclose(after.sensor_in_tcp, before.sensor_in_tcp, atol=1e-14)
+    np.testing.assert_array_equal(after.tcp_position, before.tcp_position)
+    assert str(sensor) == "mock"
+
+
+@pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({}, "does not say where the sensor sits on the flange: --tool FILE"),
+        ({"geometry": {"flange_to_tcp": 3}}, "flange_to_tcp"),
+        ({"geometry": tool.transforms(PEN), "sensor": 3}, "sensor"),
+    ],
+)
+def test_facts_that_are_no_geometry_are_refused(facts, words):
+    with pytest.raises(InputError, match=words):
+        tool.restored(facts, "poses.parquet")
 
 
 def test_what_may_be_left_out_has_its_plain_meaning():
@@ -72,7 +139,9 @@ def test_what_may_be_left_out_has_its_plain_meaning():
         (Source("pen.json", b"{"), "is not JSON"),
         (Source("pen.json", b"[]"), "not an object"),
         (changed(schema="skill"), "has schema 'skill', a tool file is needed"),
-        (changed(version=2), "version 2 is newer"),
+        (changed(version=3), "version 3 is newer"),
+        (changed(payload=None), "payload: is missing; dmpcli calibrate --tool pen.json finds it"),
+        (changed(calibration={"poses": 2}), "calibration"),
         (changed(payload__weight=-1.0), "payload.weight"),
         (changed(payload__weight=None), "payload.weight"),
         (changed(payload__mass=3.0), "payload.mass"),

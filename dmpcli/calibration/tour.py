@@ -1,0 +1,193 @@
+"""The tool through its static poses: turned about its tip by the servo loop of `execute`."""
+
+import signal
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.calibration.orientations import around
+from dmpcli.calibration.resting import Watcher, at_rest
+from dmpcli.calibration.settings import CalibrateSettings
+from dmpcli.errors import InputError, RefusedError
+from dmpcli.instruments import guards
+from dmpcli.instruments.interruption import Interruption
+from dmpcli.instruments.protocols import RobotState
+from dmpcli.instruments.sensing import Sensing
+from dmpcli.primitives.identification import check_orientations
+from dmpcli.primitives.reach import Reach
+from dmpcli.records.static_poses import StaticPose
+from dmpcli.streaming import plan as planning
+from dmpcli.streaming import preflight
+from dmpcli.streaming.contact import Touch
+from dmpcli.streaming.loop import Arm, Loop, Watch
+from dmpcli.streaming.plan import Plan, Stroke
+
+_TRIES = 3
+
+Pose = tuple[Floats, Floats]
+
+
+class Interrupted(Exception):  # noqa: N818
+    """A signal came, and the arm stands still.
+
+    Attributes
+    ----------
+    number : int
+    """
+
+    def __init__(self, number: int, reason: str) -> None:
+        super().__init__(reason)
+        self.number = number
+
+
+class Tour:
+    """One way through all poses and back.
+
+    Parameters
+    ----------
+    arm : Arm
+        Ready, not in servo mode.
+    sensing : Sensing
+        Has heard its first sample.
+    settings : CalibrateSettings
+    interruption : Interruption
+        The first signal decelerates, the second stops at once.
+    taken : list of StaticPose
+        Filled, and kept whatever ends the tour.
+    reach : Reach, optional
+        Of an arm whose joints are known: then all poses are checked before anything moves.
+    tick : callable
+        Called after each pose.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        sensing: Sensing,
+        settings: CalibrateSettings,
+        interruption: Interruption,
+        taken: list[StaticPose],
+        reach: Reach | None = None,
+        tick: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._arm, self._sensing, self._settings = arm, sensing, settings
+        self._interruption, self._taken, self._tick = interruption, taken, tick
+        self._reach = reach
+        self._watcher = Watcher(arm.servo, arm.clock, sensing)
+
+    def run(self) -> None:
+        """Visit every pose, and return to where the tool stood.
+
+        Raises
+        ------
+        InputError
+            The robot does not take the servo period.
+        RefusedError
+            The arm is not ready, cannot reach a pose, meets an obstacle or does not come to rest.
+        InstrumentError
+            An instrument fails.
+        Interrupted
+            A signal came.
+        """
+        s = self._settings
+        state = self._arm.servo.state()
+        home = (state.position, state.rotation)
+        goals = [(state.position, R) for R in around(state.rotation, s.poses, s.tilt)]
+        self._check(state, [home, *goals, home])
+        self._at_start = self._sensing.newest.wrench
+        for number, goal in enumerate(goals, start=1):
+            self._go(goal, f"pose {number}")
+            self._taken.append(self._dwell(number))
+            self._tick()
+        self._go(home, "the way back")
+
+    def _check(self, state: RobotState, stops: list[Pose]) -> None:
+        """Refuse before anything moves what would be refused on the way."""
+        arm, s = self._arm, self._settings
+        shortest, longest = arm.info.period_range
+        if not shortest <= s.period <= longest:
+            raise InputError(
+                f"--period {s.period:g}: the {arm.info.make} robot takes {shortest:g} to "
+                f"{longest:g} s"
+            )
+        guards.check_state(state, s.workspace)
+        # The sensor's turn on the flange changes nothing here.
+        check_orientations(np.array([R for _, R in stops[1:-1]]), s.condition)
+        if self._reach is None:
+            return
+        joints = self._reach.standing(state.joints, *stops[0])
+        for start, goal in pairwise(stops):
+            plan, there = self._way(start, goal), self._there(goal)
+            checks, joints = preflight.by_joints(plan, there, self._reach, joints)
+            for check in checks:
+                if not check.passed:
+                    raise RefusedError(
+                        f"the arm cannot turn the tool through all poses from here: "
+                        f"{check.quantity} {check.value:.3g} {check.unit} is over "
+                        f"{check.limit:.3g} {check.unit};\nbegin in another pose, or give a "
+                        "smaller --tilt"
+                    )
+
+    def _there(self, goal: Pose) -> Stroke:
+        """A stroke of one period that stays in a pose."""
+        return Stroke(
+            "pose",
+            np.array([0.0, self._settings.period]),
+            np.array([goal[0], goal[0]]),
+            np.array([goal[1], goal[1]]),
+        )
+
+    def _way(self, start: Pose, goal: Pose) -> Plan:
+        """Straight to a pose, and one period there."""
+        s = self._settings
+        speed = s.limits.speed
+        return planning.make(self._there(goal), s.period, 1.0, s.limits, start, speed)
+
+    def _go(self, goal: Pose, where: str) -> None:
+        self._stop_if_asked()
+        s, state = self._settings, self._arm.servo.state()
+        watch = Watch(
+            following_error=s.following_error,
+            following_angle=s.following_angle,
+            force=s.max_force,
+            torque=s.max_torque,
+        )
+        loop = Loop(
+            self._way((state.position, state.rotation), goal),
+            s.limits,
+            watch,
+            self._arm,
+            Touch(self._sensing, self._change),
+        )
+        outcome = loop.run(self._interruption)
+        if outcome.failure is not None:
+            raise type(outcome.failure)(f"{where}: {outcome.reason}")
+        if outcome.signal is not None:
+            raise Interrupted(outcome.signal, outcome.reason)
+
+    def _change(self, sensed: Floats, rotation: Floats) -> Floats:  # noqa: ARG002
+        """What the loop watches: the payload is not known yet, so its turning counts as force."""
+        return sensed - self._at_start
+
+    def _dwell(self, number: int) -> StaticPose:
+        s = self._settings
+        for _ in range(_TRIES):
+            rested = self._watcher.rests(s.settle, s.patience, self._asked)
+            self._stop_if_asked()
+            if not rested:
+                break
+            pose = self._watcher.dwell(s.dwell)
+            guards.check_state(self._arm.servo.state(), s.workspace)
+            if at_rest(pose.moved, pose.turned):
+                return pose
+        raise RefusedError(f"pose {number}: the arm does not come to rest; see what moves it")
+
+    def _asked(self) -> bool:
+        return self._interruption.count > 0
+
+    def _stop_if_asked(self) -> None:
+        number = self._interruption.number
+        if number is not None:
+            raise Interrupted(number, f"{signal.Signals(number).name}: stopped between two poses")

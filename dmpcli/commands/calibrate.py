@@ -1,0 +1,328 @@
+"""``dmpcli calibrate``: find the tool's weight, its centre of mass, and the sensor's zero."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor, Workspace
+from dmpcli.errors import InputError, RefusedError, counted
+
+if TYPE_CHECKING:
+    from dmpcli.calibration.settings import CalibrateSettings
+    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.instruments.protocols import Clock, SensorInfo
+    from dmpcli.instruments.urls import Bench
+    from dmpcli.primitives.identification import Identification
+    from dmpcli.primitives.wrench import Tool
+    from dmpcli.records.static_poses import StaticPose
+    from dmpcli.records.streams import Source
+
+
+def command(
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="TOOL", help="Tool file; - is stdout.")
+    ],
+    tool: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where TCP and sensor sit; the mock knows its own."),
+    ] = None,
+    robot: Robot = "mock:",
+    sensor: Sensor = "mock:",
+    poses: Annotated[int | None, typer.Option(metavar="N", help="How many (12).")] = None,
+    tilt: Annotated[
+        float | None, typer.Option(metavar="DEG", help="How far the tool is tilted (45).")
+    ] = None,
+    dwell: Annotated[
+        float | None, typer.Option(metavar="S", help="How long each pose is read (1).")
+    ] = None,
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="You move the arm; Enter takes a pose, q ends.")
+    ] = False,
+    from_file: Annotated[
+        str | None, typer.Option("--from", metavar="POSES", help="Poses that --save kept.")
+    ] = None,
+    save: Annotated[
+        str | None, typer.Option(metavar="POSES", help="Keep the poses as Parquet.")
+    ] = None,
+    condition: Annotated[
+        float | None, typer.Option(metavar="NUMBER", help="Refuse a worse conditioned set (10).")
+    ] = None,
+    max_residual: Annotated[
+        float | None, typer.Option(metavar="N", help="Refuse poses that fit worse, RMS (0.3).")
+    ] = None,
+    period: Annotated[
+        float | None, typer.Option(metavar="S", help="Servo period, 0.02 s by default.")
+    ] = None,
+    max_rotation_speed: Annotated[float | None, typer.Option(metavar="RAD_PER_S")] = None,
+    max_force: Annotated[
+        float | None, typer.Option(metavar="N", help="Stop when the reading changes by more (30).")
+    ] = None,
+    max_torque: Annotated[
+        float | None, typer.Option(metavar="N_M", help="Stop when the reading changes by more (3).")
+    ] = None,
+    workspace: Workspace = None,
+    realtime: Realtime = False,
+    allow_mixed: AllowMixed = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace files from real instruments.")
+    ] = False,
+    preset: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE.toml", help="[calibrate] section.")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Beats the preset.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Identify what hangs on the sensor from static poses, with nothing touching the tool.
+
+    The arm turns the tool about its tip, slowly and in all directions, and comes back; leave room
+    for a tilt of 45° all around, or say less with --tilt.
+    """
+    import math
+
+    from dmpcli.calibration.settings import CalibrateSettings
+    from dmpcli.records import settings as layers
+    from dmpcli.records import streams
+
+    given = {
+        "poses": poses,
+        "tilt": None if tilt is None else math.radians(tilt),
+        "dwell": dwell,
+        "condition": condition,
+        "max_residual": max_residual,
+        "period": period,
+        "max_rotation_speed": max_rotation_speed,
+        "max_force": max_force,
+        "max_torque": max_torque,
+        "workspace": workspace,
+    }
+    settings = layers.resolve(CalibrateSettings, "calibrate", given, preset, config)
+    if from_file is not None and (by_hand or save is not None):
+        raise InputError("--from: reads poses; --by-hand and --save take new ones")
+    if "-" in (output, save) and output == save:
+        raise InputError("-o - --save -: standard output takes one of them")
+    for name in (output, save):
+        if name is not None:
+            streams.check_writable(name)
+    request = Request(
+        output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force, quiet
+    )
+    if from_file is None:
+        _measure(settings, request)
+    else:
+        _from_file(settings, request, from_file)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asks for beside the settings."""
+
+    output: str
+    tool: Path | None
+    robot: str
+    sensor: str
+    by_hand: bool
+    save: str | None
+    realtime: bool
+    allow_mixed: bool
+    force: bool
+    quiet: bool
+
+
+def _from_file(settings: "CalibrateSettings", request: Request, name: str) -> None:
+    from dmpcli.records import static_poses, streams
+    from dmpcli.records import tool as tool_file
+
+    sources = {"poses": streams.read(name)}
+    taken, facts = static_poses.decode(sources["poses"])
+    if request.tool is None:
+        geometry, sensor = tool_file.restored(facts, sources["poses"].name)
+    else:
+        sources["tool"] = streams.read(request.tool)
+        geometry = tool_file.geometry(sources["tool"])
+        sensor = tool_file.sensor_of(facts, sources["poses"].name)
+    _conclude(taken, geometry, sensor, settings, request, sources, {})
+
+
+def _measure(settings: "CalibrateSettings", request: Request) -> None:
+    from dmpcli.calibration import result
+    from dmpcli.calibration.by_hand import Keyboard
+    from dmpcli.calibration.tour import Interrupted
+    from dmpcli.commands.messages import tell, warn
+    from dmpcli.instruments import guards, urls
+    from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
+    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.instruments.mock import PEN
+    from dmpcli.records import streams
+    from dmpcli.records import tool as tool_file
+
+    addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
+    urls.need_tool(addresses[1], request.tool is not None)
+    repeatable = urls.repeatable(addresses)
+    _check_existing(request, repeatable)
+    keyboard = Keyboard("--by-hand") if request.by_hand else None
+    source = None if request.tool is None else streams.read(request.tool)
+    geometry = PEN if source is None else tool_file.geometry(source)
+    realtime = request.realtime or request.by_hand or not repeatable
+    clock = MonotonicClock() if realtime else SimulatedClock()
+    bench = urls.connect(
+        request.robot, request.sensor, clock, allow_mixed=request.allow_mixed, tool=geometry
+    )
+    if keyboard is None:
+        guards.check_streams(bench.robot)
+    if bench.note:
+        tell(bench.note, request.quiet)
+    taken: list[StaticPose] = []
+    info: SensorInfo | None = None
+    options = {"robot": urls.in_provenance(request.robot), "by_hand": request.by_hand}
+    options |= {"sensor": urls.in_provenance(request.sensor), "realtime": realtime}
+    try:
+        with Interruption() as interruption:
+            info = bench.sensor.open()
+            _take(bench, info, clock, settings, request, interruption, keyboard, taken)
+    except Interrupted as stop:
+        warn(str(stop))
+        raise typer.Exit(128 + stop.number) from None
+    finally:
+        # What was measured is kept, whatever ended it.
+        closing = guards.leave(bench.robot.close, bench.sensor.close)
+        if taken and info is not None:
+            _save(taken, geometry, info, settings, request, source, options)
+    if closing is not None:
+        raise closing
+    sources = {} if source is None else {"tool": source}
+    try:
+        _conclude(taken, geometry, result.identity(info), settings, request, sources, options)
+    except RefusedError as refused:
+        if request.save is not None or not (request.by_hand and taken):
+            raise
+        lost = counted(len(taken), "pose")
+        raise RefusedError(f"{refused}; {lost} not kept: --save POSES keeps them") from None
+
+
+def _take(
+    bench: "Bench",
+    info: "SensorInfo",
+    clock: "Clock",
+    settings: "CalibrateSettings",
+    request: Request,
+    interruption: "Interruption",
+    keyboard: Any,
+    taken: "list[StaticPose]",
+) -> None:
+    """Fill `taken`, by the arm's own motion or as a person leads it."""
+    from dmpcli.calibration.resting import Watcher
+    from dmpcli.calibration.tour import Tour
+    from dmpcli.commands.messages import progress, tell
+    from dmpcli.instruments.sensing import Sensing
+    from dmpcli.instruments.watchdog import watched
+    from dmpcli.streaming import session
+    from dmpcli.streaming.loop import Arm
+
+    rate = min(settings.sensor_rate, info.rate)
+    robot = watched(bench.robot) if bench.lab is None else bench.robot
+    arm = Arm(robot, robot.open(), clock)
+    bench.sensor.start(rate)
+    sensing = Sensing(bench.sensor, info, rate, settings.period, clock)
+    sensing.first(settings.settle)
+    if keyboard is None:
+        reach = session.reach_of(bench.robot, None, None)
+        with progress("poses", settings.poses, request.quiet) as step:
+            tour = Tour(arm, sensing, settings, interruption, taken, reach, lambda: step(1))
+            tour.run()
+        return
+    from dmpcli.calibration.by_hand import lead
+
+    lead(
+        Watcher(arm.servo, clock, sensing),
+        keyboard,
+        settings,
+        interruption,
+        taken,
+        lambda message: tell(message, request.quiet),
+    )
+
+
+def _check_existing(request: Request, repeatable: bool) -> None:
+    for name in (request.output, request.save):
+        if name not in (None, "-") and not (repeatable or request.force) and Path(name).exists():
+            raise InputError(
+                f"{name}: exists, and a measurement cannot be made again; choose another name, or "
+                "give --force"
+            )
+
+
+def _save(
+    taken: "list[StaticPose]",
+    geometry: "Tool",
+    info: "SensorInfo",
+    settings: "CalibrateSettings",
+    request: Request,
+    source: "Source | None",
+    options: dict[str, Any],
+) -> None:
+    from dmpcli.calibration import result
+    from dmpcli.records import static_poses, streams
+    from dmpcli.records import tool as tool_file
+    from dmpcli.records.record import Provenance, input_of
+
+    if request.save is None:
+        return
+    facts = {
+        "geometry": tool_file.transforms(geometry),
+        "sensor": result.identity(info).model_dump(),
+    }
+    inputs = () if source is None else (input_of("tool", source),)
+    provenance = Provenance("calibrate", options | settings.model_dump(mode="json"), inputs, facts)
+    streams.write(request.save, static_poses.encode(taken, provenance))
+
+
+def _conclude(
+    taken: "list[StaticPose]",
+    geometry: "Tool",
+    sensor: Any,
+    settings: "CalibrateSettings",
+    request: Request,
+    sources: "dict[str, Source]",
+    options: dict[str, Any],
+) -> None:
+    """Identify, say what came out, write the tool file."""
+    from dmpcli.calibration import result
+    from dmpcli.commands.messages import tell
+    from dmpcli.records import streams
+    from dmpcli.records import tool as tool_file
+
+    found, remarks = result.identified(taken, geometry, settings.condition, settings.max_residual)
+    calibration = tool_file.calibrated(
+        found,
+        sensor,
+        options | settings.model_dump(mode="json"),
+        [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
+    )
+    streams.write(
+        request.output, tool_file.encode(result.with_payload(geometry, found), calibration)
+    )
+    for remark in remarks:
+        tell(remark, request.quiet)
+    if not request.quiet:
+        _show(found)
+    tell(f"{streams.shown(request.output, output=True)}: {result.verdict(found)}", request.quiet)
+
+
+def _show(found: "Identification") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from dmpcli.calibration import result
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("")
+    table.add_column("identified", justify="right", no_wrap=True)
+    table.add_column("± / largest", justify="right", no_wrap=True)
+    table.add_column("unit")
+    for row in result.table(found):
+        table.add_row(*row)
+    Console(stderr=True, width=80, highlight=False).print(table)
