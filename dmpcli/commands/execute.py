@@ -2,24 +2,36 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dmpcli.commands.options import (
+    SENSORS,
+    AllowMixed,
+    FollowingError,
+    MaxForce,
+    MaxTorque,
+    Quiet,
+    Realtime,
+    Robot,
+    ToolCheck,
+    Workspace,
+)
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
+    from dmpcli.commands.keeping import Keeper
     from dmpcli.instruments.urls import Bench
     from dmpcli.primitives.coupling import Filter
+    from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.record import Provenance
     from dmpcli.records.streams import Source
     from dmpcli.streaming.loop import Arm, Loop, Outcome
-    from dmpcli.streaming.plan import Plan
+    from dmpcli.streaming.many import Judged
     from dmpcli.streaming.settings import ExecuteSettings
-    from dmpcli.streaming.stroke_file import Found
-
-Box = tuple[float, float, float, float, float, float]
+    from dmpcli.streaming.stroke_file import Batch
 
 
 def command(
@@ -30,12 +42,16 @@ def command(
         str | None,
         typer.Option("-o", "--output", metavar="RUN", help="Run file; - is stdout."),
     ] = None,
-    robot: Annotated[str, typer.Option(metavar="URL", help="The arm.")] = "mock:",
+    robot: Robot = "mock:",
     sensor: Annotated[
         str | None,
-        typer.Option(metavar="URL", help="Force sensor; with --coupling force mock: if not given."),
+        typer.Option(metavar="URL", help=f"With --coupling force mock: if not given. {SENSORS}"),
     ] = None,
     tool: Annotated[Path | None, typer.Option(metavar="FILE", help="Tool file.")] = None,
+    robot_model: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66."),
+    ] = None,
     coupling: Annotated[
         Literal["force"] | None, typer.Option(help="Press on the surface, eq. (10).")
     ] = None,
@@ -43,46 +59,51 @@ def command(
         float | None, typer.Option(metavar="N", help="Force to press with (5).")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(metavar="F", help="1 as planned, 0.5 at half the speed.")
+        float | None,
+        typer.Option(metavar="F", help="1 as planned; below 1 the ways are slower too."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only check; print the verdict, send nothing.")
     ] = False,
-    stroke_id: Annotated[
-        str | None, typer.Option("--id", metavar="ID", help="Which of several strokes.")
+    stroke_ids: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--id", metavar="ID", help="Which of several strokes, in this order; all by default."
+        ),
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Lift the pen by this after each stroke (20 for several)."),
+    ] = None,
+    transfer_speed: Annotated[
+        float | None, typer.Option(metavar="MM_PER_S", help="Through the air, at most (100).")
+    ] = None,
+    retract_speed: Annotated[
+        float | None, typer.Option(metavar="MM_PER_S", help="Off the work, at most (50).")
     ] = None,
     period: Annotated[
         float | None, typer.Option(metavar="S", help="Servo period, 0.02 s by default.")
     ] = None,
     approach: Annotated[
         float | None,
-        typer.Option(metavar="MM_PER_S", help="Go straight to the start, no faster than this."),
+        typer.Option(metavar="MM_PER_S", help="Go to the start, no faster than this."),
     ] = None,
     start_tolerance: Annotated[
         float | None, typer.Option(metavar="MM", help="How far off the start the arm may stand.")
     ] = None,
-    workspace: Annotated[
-        Box | None,
-        typer.Option(metavar="XMIN XMAX YMIN YMAX ZMIN ZMAX", help="Box to stay in, mm."),
-    ] = None,
+    workspace: Workspace = None,
     max_speed: Annotated[float | None, typer.Option(metavar="MM_PER_S")] = None,
     max_acceleration: Annotated[float | None, typer.Option(metavar="MM_PER_S2")] = None,
     max_jerk: Annotated[float | None, typer.Option(metavar="MM_PER_S3")] = None,
     max_rotation_speed: Annotated[float | None, typer.Option(metavar="RAD_PER_S")] = None,
     max_rotation_acceleration: Annotated[float | None, typer.Option(metavar="RAD_PER_S2")] = None,
     max_rotation_jerk: Annotated[float | None, typer.Option(metavar="RAD_PER_S3")] = None,
-    following_error: Annotated[
-        float | None, typer.Option(metavar="MM", help="Stop when the arm strays further.")
-    ] = None,
-    max_force: Annotated[
-        float | None, typer.Option(metavar="N", help="Stop at a larger force on the tool.")
-    ] = None,
-    realtime: Annotated[
-        bool, typer.Option("--realtime", help="Pace the mock by the real clock.")
-    ] = False,
-    allow_mixed: Annotated[
-        bool, typer.Option("--allow-mixed", help="A real instrument beside a mock one.")
-    ] = False,
+    following_error: FollowingError = None,
+    max_force: MaxForce = None,
+    max_torque: MaxTorque = None,
+    tool_check: ToolCheck = None,
+    realtime: Realtime = False,
+    allow_mixed: AllowMixed = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
     preset: Annotated[
         str | None, typer.Option(metavar="NAME|FILE.toml", help="[execute] section.")
@@ -90,7 +111,7 @@ def command(
     config: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help="Beats the preset.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No messages.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once."""
     from dmpcli.records.settings import resolve
@@ -101,6 +122,9 @@ def command(
         "speed": speed,
         "period": period,
         "approach": approach,
+        "clearance": clearance,
+        "transfer_speed": transfer_speed,
+        "retract_speed": retract_speed,
         "start_tolerance": start_tolerance,
         "workspace": workspace,
         "max_speed": max_speed,
@@ -111,23 +135,27 @@ def command(
         "max_rotation_jerk": max_rotation_jerk,
         "following_error": following_error,
         "max_force": max_force,
+        "max_torque": max_torque,
+        "tool_check": tool_check,
     }
     settings = resolve(ExecuteSettings, "execute", given, preset, config)
     if coupling is None and force_setpoint is not None:
         raise InputError("--force-setpoint: nothing presses without --coupling force")
-    if max_force is not None and sensor is None and coupling is None:
-        raise InputError("--max-force: nothing feels a force without --sensor URL")
+    for option, most in (("--max-force", max_force), ("--max-torque", max_torque)):
+        if most is not None and sensor is None and coupling is None:
+            raise InputError(f"{option}: nothing feels a force without --sensor URL")
     if output is None and not dry_run:
         raise InputError("-o: name the run file, or ask for the checks alone with --dry-run")
     _execute(
         settings,
         Request(
             trajectory=trajectory,
-            stroke_id=stroke_id,
+            ids=tuple(stroke_ids or ()),
             output=None if dry_run else output,
             robot=robot,
             sensor=sensor or ("mock:" if coupling else None),
             tool=tool,
+            robot_model=robot_model,
             presses=coupling is not None,
             realtime=realtime,
             allow_mixed=allow_mixed,
@@ -142,11 +170,12 @@ class Request:
     """What the command line asks for beside the settings; no output is a dry run."""
 
     trajectory: str
-    stroke_id: str | None
+    ids: tuple[str, ...]
     output: str | None
     robot: str
     sensor: str | None
     tool: Path | None
+    robot_model: str | None
     presses: bool
     realtime: bool
     allow_mixed: bool
@@ -155,44 +184,90 @@ class Request:
 
 
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
-    from dmpcli.commands.messages import tell
+    from dmpcli.commands.keeping import Keeper
+    from dmpcli.commands.messages import tell, warn
     from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.streaming import preflight, session, stroke_file, verdict
+    from dmpcli.instruments.watchdog import watched
+    from dmpcli.records import streams
+    from dmpcli.streaming import many, session, stroke_file, verdict
     from dmpcli.streaming.loop import Arm
 
-    sensor = request.sensor or urls.MOCK
-    addresses = urls.check(request.robot, sensor, request.allow_mixed)
+    addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
     if request.sensor is not None:
         urls.need_tool(addresses[1], request.tool is not None)
     repeatable = urls.repeatable(addresses)
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
-    found = stroke_file.find(request.trajectory, request.stroke_id)
-    coupling = None
-    if request.presses:
-        coupling = session.coupling_filter(found.stroke, found.facts, settings)
+    batch = stroke_file.find(request.trajectory, request.ids)
+    if batch.failed:
+        warn(many.passed_over(batch.failed))
+    coupling = session.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
-    scene = session.scene(found.stroke, request.presses)
-    bench = urls.connect(request.robot, sensor, clock, allow_mixed=request.allow_mixed, scene=scene)
+    keeper = None
+    if request.output is not None:
+        keeper = Keeper(request.output, realtime, request.quiet)
+        keeper.check()
+    scene = session.scene(batch.found[0].stroke, request.presses)
+    # What weighs on the sensor counts only where there is one.
+    held = _decoded(tool_file, weighed=request.sensor is not None)
+    bench = urls.connect(
+        request.robot,
+        request.sensor,
+        clock,
+        allow_mixed=request.allow_mixed,
+        scene=scene,
+        tool=held,
+    )
+    if bench.note:
+        tell(bench.note, request.quiet)
+    robot = watched(bench.robot) if realtime else bench.robot
     try:
-        arm = Arm(bench.robot, bench.robot.open(), clock)
+        arm = Arm(robot, robot.open(), clock)
         session.check_period(arm, settings.period)
-        plan, checks = session.prepare(found.stroke, settings, bench.robot.state())
-        if request.output is None:
-            tell(verdict.table(plan, checks), request.quiet)
-        preflight.refuse_any(checks)
-        if request.output is None:
+        if coupling is not None and (late := session.slowed(arm.info.lookahead)):
+            warn(late)
+        reach = session.reach_of(bench.robot, request.robot_model, held)
+        judged = _judged(batch, settings, arm, reach, request)
+        if keeper is None:
+            tell(verdict.table(judged), request.quiet)
+        many.refuse_any(judged)
+        if keeper is None:
             return
-        loop = _loop(bench, arm, plan, settings, request, coupling, tool_file)
-        provenance = _provenance(settings, request, found, coupling, tool_file, bench.simulated)
-        outcome = _stream(loop, provenance, request, realtime)
+        loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
+        provenance = _provenance(settings, request, batch, tool_file, bench.simulated)
+        provenance.facts.update(session.facts_of(arm, coupling, settings))
+        outcome = _stream(loop, provenance, request, realtime, keeper)
     finally:
-        closing = guards.leave(bench.robot.close, bench.sensor.close)
-    if closing is not None and outcome.error is None:
+        closing = guards.leave(robot.close, bench.sensor.close)
+    if realtime:
+        tell(str(loop.pace), request.quiet)
+    if loop.pressing is not None:
+        tell(session.pressed(loop.pressing), request.quiet)
+    stopped = closing or outcome.failure or outcome.signal
+    if stopped and keeper.kept:
+        name = streams.shown(keeper.output, output=True)
+        tell(f"{name}: {len(loop.log)} rows kept", request.quiet)
+    if closing is not None and outcome.failure is None:
         raise closing
-    _end(outcome, request)
+    left = many.rest_of(batch, loop.drawn) if many.lifts(batch, settings) else ""
+    _end(outcome, request, left)
+
+
+def _judged(
+    batch: "Batch",
+    settings: "ExecuteSettings",
+    arm: "Arm",
+    reach: "Reach | None",
+    request: Request,
+) -> "list[Judged]":
+    """Plan and check every stroke from where the arm stands."""
+    from dmpcli.commands.messages import progress
+    from dmpcli.streaming import many
+
+    with progress("checking", len(batch.found), request.quiet) as advance:
+        return many.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
 def _check_output(request: Request, repeatable: bool) -> None:
@@ -213,31 +288,45 @@ def _read(tool: Path | None) -> "Source | None":
     return None if tool is None else streams.read(tool)
 
 
+def _decoded(tool_file: "Source | None", weighed: bool = True) -> "Tool | None":
+    from dmpcli.records import tool
+
+    if tool_file is None:
+        return None
+    return tool.decode(tool_file) if weighed else tool.geometry(tool_file)
+
+
 def _loop(
     bench: "Bench",
     arm: "Arm",
-    plan: "Plan",
+    judged: "list[Judged]",
     settings: "ExecuteSettings",
     request: Request,
     coupling: "Filter | None",
     tool_file: "Source | None",
+    keeper: "Keeper",
 ) -> "Loop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
+    from dmpcli.instruments.protocols import PlanPlayer
     from dmpcli.streaming import session
     from dmpcli.streaming.loop import Loop
+    from dmpcli.streaming.playback import Playback
 
-    touch = None
+    touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
         tool = _tool(bench, tool_file)
-        touch = session.touch(bench.sensor, tool, plan, settings, arm.clock, coupling)
-    return Loop(plan, settings.limits, session.watch(settings), arm, touch)
+        # The mock's own tool needs no check; a file's may be another tool's.
+        check = None if tool_file is None else settings.tool_check
+        touch = session.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+    watch = session.watch(settings)
+    kind = Playback if isinstance(arm.servo, PlanPlayer) else Loop
+    return kind(plans[0], settings.limits, watch, arm, touch, keeper.hindrance, plans[1:])
 
 
 def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
-    from dmpcli.records import tool
-
-    if tool_file is not None:
-        return tool.decode(tool_file)
+    tool = _decoded(tool_file)
+    if tool is not None:
+        return tool
     if bench.lab is None:
         raise InputError("--sensor: without the mock lab the tool is not known: --tool FILE")
     return bench.lab.scene.tool
@@ -246,60 +335,68 @@ def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
 def _provenance(
     settings: "ExecuteSettings",
     request: Request,
-    found: "Found",
-    coupling: "Filter | None",
+    batch: "Batch",
     tool_file: "Source | None",
     simulated: bool,
 ) -> "Provenance":
     """Return what is known of the run before it is made."""
     from dmpcli.instruments import urls
     from dmpcli.records.record import Provenance, input_of
-    from dmpcli.streaming import session
+    from dmpcli.streaming import many
 
-    inputs = [input_of("trajectory", found.source)]
-    if tool_file is not None and request.sensor is not None:
+    inputs = list(batch.entries)
+    changes = request.sensor is not None or not request.robot.startswith(urls.MOCK)
+    if tool_file is not None and changes:
         inputs.append(input_of("tool", tool_file))
     options = settings.model_dump(mode="json")
     options |= {
         "robot": urls.in_provenance(request.robot),
         "sensor": urls.in_provenance(request.sensor),
     }
-    options |= {"id": found.stroke.id, "coupling": "force" if request.presses else None}
-    facts = {"simulated": simulated, "trajectory": found.facts}
-    if coupling is not None:
-        facts["coupling"] = session.facts_of(coupling)
+    options |= {"coupling": "force" if request.presses else None}
+    facts: dict[str, Any] = {"simulated": simulated}
+    if many.lifts(batch, settings):
+        options["id"] = list(request.ids) or None
+        facts |= many.facts_of(batch)
+    else:
+        options["id"] = batch.found[0].stroke.id
+        facts["trajectory"] = batch.found[0].facts
     return Provenance("execute", options, tuple(inputs), facts)
 
 
-def _stream(loop: "Loop", provenance: "Provenance", request: Request, realtime: bool) -> "Outcome":
+def _stream(
+    loop: "Loop", provenance: "Provenance", request: Request, realtime: bool, keeper: "Keeper"
+) -> "Outcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.commands.messages import tell
     from dmpcli.instruments.interruption import Interruption
-    from dmpcli.records import record, streams
+    from dmpcli.records.schemas import RUN
     from dmpcli.streaming import session
     from dmpcli.streaming.loop import Outcome
 
     outcome = Outcome("a defect of dmpcli")
     with Interruption() as interruption:
+        keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once", request.quiet)
         try:
             outcome = loop.run(interruption)
         finally:
-            if loop.log.rows:
-                run = session.record_of(loop, outcome, provenance, realtime)
-                streams.write(str(request.output), record.encode(run))
+            if len(loop.log):
+                keeper.keep(session.record_of(loop, outcome, provenance, realtime), outcome.failure)
+            else:
+                keeper.drop()
     return outcome
 
 
-def _end(outcome: "Outcome", request: Request) -> None:
-    """Say how the run ended, with the exit code that it earns."""
+def _end(outcome: "Outcome", request: Request, left: str) -> None:
+    """Say how the run ended, with the exit code that it earns, and which strokes are left."""
     from dmpcli.commands.messages import tell, warn
 
-    if outcome.error is not None:
-        raise outcome.error(outcome.reason)
+    said = outcome.reason + (left and f"; {left}")
+    if outcome.failure is not None:
+        raise type(outcome.failure)(said) if left else outcome.failure
     if outcome.signal is not None:
-        warn(outcome.reason)
+        warn(said)
         raise typer.Exit(128 + outcome.signal)
-    missed = f", {outcome.missed} deadlines missed" if outcome.missed else ""
-    tell(f"{request.output}: {outcome.reason}{missed}", request.quiet)
+    tell(f"{request.output}: {said}", request.quiet)

@@ -1,7 +1,7 @@
 """What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from dmpcli.streaming.plan import Plan
 
 # The force has settled when it stays this near to the set-point for this long.
 SETTLED_SHARE, SETTLED_TIME = 0.1, 0.1
+LONG = 0.15
+"""A look-ahead beyond which the coupling holds the force badly, s."""
 # A coupling so slow that it has found nothing by then is a mistake, s.
 LONGEST_SEEKING = 60.0
 
@@ -28,26 +30,42 @@ class Pressing:
         Of the plan's servo period.
     plan : Plan
         With normals.
+    lookahead : float
+        By how much the arm lags its set-points, s: what the force does is
+        seen that much later, and must have lasted so long.
 
     Attributes
     ----------
+    law : Law
+    felt : list of float
+        Forces along the normal on the stroke, of `on` on all strokes, N.
     e : float
         Output of the admittance model, mm along the normal.
     """
 
-    def __init__(self, law: Law, filter_: Filter, plan: Plan) -> None:
-        self._law = law
+    def __init__(self, law: Law, filter_: Filter, plan: Plan, lookahead: float = 0.0) -> None:
+        self.law = law
+        self._lookahead = lookahead
         self._filter = filter_
         self._plan = plan
         self._state = Displacement()
         self._delta = np.zeros(2)
         self._calm = 0.0
+        self._found = False
+        self.felt: list[float] = []
         self._sought = 0.0
         self._seek = law.setpoint / float(law.model.damping[0])  # mm/s, without contact
         if plan.normal is None:
             raise ValueError("a plan without normals has nothing to press along")
-        lift = np.sum(plan.derivatives()[0][:, 0] * plan.normal[:-1], axis=-1)
+        lift = np.sum(np.diff(plan.position, axis=0) * plan.normal[:-1], axis=-1) / plan.period
         self._retreats = np.append(lift > self._seek, False)
+        self._reach = float((plan.position[-1] - plan.position[plan.last]) @ plan.normal[-1])
+
+    def on(self, plan: Plan) -> "Pressing":
+        """Return the same law and filter on another plan; nothing was felt there yet."""
+        other = Pressing(self.law, self._filter, plan, self._lookahead)
+        other.felt = self.felt
+        return other
 
     @property
     def e(self) -> float:
@@ -57,16 +75,19 @@ class Pressing:
     @property
     def settled(self) -> bool:
         """The force has stayed near its set-point."""
-        return self._calm >= SETTLED_TIME
+        return self._calm >= max(SETTLED_TIME, self._lookahead)
 
     @property
     def given_up(self) -> str:
         """Why no contact can be had; empty while there is hope."""
-        law = self._law
+        law = self.law
         if not self._state.touched and law.clamp - abs(self._state.e) < 1e-9:
             return f"no contact within {law.clamp:g} mm of the plan"
         if self._sought > min(5.0 + 2.0 * law.clamp / self._seek, LONGEST_SEEKING):
-            return f"the force does not settle at {law.setpoint:g} N"
+            said = f"the force does not settle at {law.setpoint:g} N"
+            if self._lookahead > LONG:
+                return f"{said} behind a look-ahead of {self._lookahead:g} s, which is long"
+            return said
         return ""
 
     def displace(self, index: float, wrench: Floats) -> Floats:
@@ -81,11 +102,16 @@ class Pressing:
         """
         normal, period = self._plan.normal_at(index), self._plan.period
         force = float(normal @ wrench[:3])
-        near = abs(force - self._law.setpoint) <= SETTLED_SHARE * self._law.setpoint
+        near = abs(force - self.law.setpoint) <= SETTLED_SHARE * self.law.setpoint
         self._calm = self._calm + period if near else 0.0
         self._sought += period
         retreat = bool(self._retreats[min(int(index), len(self._plan) - 1)])
-        self._state = coupling.displace(self._law, self._state, force, retreat)
+        self._found = self._found or self.settled
+        if index > self._plan.lead:
+            self.felt.append(force)
+        # Until it has settled once, a contact that is lost again is sought like the first.
+        state = self._state if self._found else replace(self._state, touched=False)
+        self._state = coupling.displace(self.law, state, force, retreat)
         self._delta = coupling.follow(self._filter, self._delta, self._state.e)
         return self.hold(index)
 
@@ -108,6 +134,26 @@ class Pressing:
         held: Floats = self._delta[0] * self._plan.normal_at(index)
         return held
 
+    def leave(self, index: float) -> Floats:
+        """Return the last displacement on the way off the work: it ends where that way ends.
+
+        Nothing is felt any more: the share that is left goes with the way that is left.
+
+        Parameters
+        ----------
+        index : float
+            Number of a set-point after the stroke's last.
+
+        Returns
+        -------
+        array, shape (3,)
+            mm.
+        """
+        plan, normal = self._plan, self._plan.normal_at(index)
+        gone = float((plan.at(index)[0] - plan.position[plan.last]) @ normal) / self._reach
+        left: Floats = max(1.0 - gone, 0.0) * self._delta[0] * normal
+        return left
+
 
 @dataclass(frozen=True)
 class Touch:
@@ -128,7 +174,7 @@ class Touch:
     pressing: Pressing | None = None
 
     def feel(self, state: RobotState, now: float) -> Floats | None:
-        """Return the mean wrench since the last cycle, or the newest one while it is fresh.
+        """Return the mean wrench of the last period or two, or the newest one while it is fresh.
 
         Parameters
         ----------
@@ -147,8 +193,8 @@ class Touch:
         InstrumentError
             The sensor is silent, or a sample must not be believed.
         """
-        samples = self.sensing.hear(now) or [self.sensing.newest]
-        if not self.sensing.fresh(now):
+        samples = self.sensing.recent(now)
+        if not samples:
             return None
         sensed = np.mean([sample.wrench for sample in samples], axis=0)
         return self.compensate(sensed, state.rotation)

@@ -1,15 +1,10 @@
 """Where on the plan the stream is: approach, press, stroke, and the stop at its end or before."""
 
-from typing import Literal
-
 import numpy as np
 
-from dmpcli.arrays import Floats
 from dmpcli.streaming import deceleration
 from dmpcli.streaming.limits import Limits
-from dmpcli.streaming.plan import Plan
-
-Phase = Literal["approach", "stroke", "stop"]
+from dmpcli.streaming.plan import Phase, Plan
 
 
 class Cursor:
@@ -37,9 +32,7 @@ class Cursor:
         self._end = float(len(plan) - 1)
         self._brake: tuple[float, float] | None = None  # index where it began, duration
         self._elapsed = 0.0
-        velocity, acceleration, _ = plan.derivatives()
-        self._speed: Floats = np.linalg.norm(velocity, axis=-1)
-        self._acceleration: Floats = np.linalg.norm(acceleration, axis=-1)
+        self._speed, self._acceleration, _ = plan.sizes
 
     @property
     def braking(self) -> bool:
@@ -63,7 +56,7 @@ class Cursor:
         """What this set-point belongs to."""
         if self._brake is not None or (self.index >= self._end and self._elapsed > 0):
             return "stop"
-        return "approach" if self.index < self.plan.lead or self.waiting else "stroke"
+        return "approach" if self.waiting else self.plan.phase_at(self.index)
 
     def release(self) -> None:
         """Go on from the stroke's start."""

@@ -8,6 +8,8 @@ import numpy as np
 from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import RefusedError
+from dmpcli.kinematics.path import Followed, Peak
+from dmpcli.primitives.reach import Reach, singular
 from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.plan import Plan, Stroke
 
@@ -34,6 +36,8 @@ class Check:
     row : int or None
         Row of the file, counted from 1.
     remedy : str
+    place : str
+        Where, if not on the stroke.
     """
 
     quantity: str
@@ -43,6 +47,7 @@ class Check:
     t: float | None
     row: int | None
     remedy: str
+    place: str = ""
 
     @property
     def passed(self) -> bool:
@@ -50,7 +55,8 @@ class Check:
         return bool(self.value <= self.limit)
 
     def __str__(self) -> str:
-        where = "" if self.t is None else f" at t = {self.t:.3f} s (row {self.row})"
+        where = self.place if self.t is None else f"at t = {self.t:.3f} s (row {self.row})"
+        where = f" {where}" if where else ""
         return (
             f"{self.quantity} {self.value:.5g} {self.unit}{where} is over the limit of "
             f"{self.limit:.5g} {self.unit}; {self.remedy}"
@@ -136,6 +142,9 @@ def near_start(distance: float, angle: float, tolerance: float, max_angle: float
 def within_limits(plan: Plan, stroke: Stroke, limits: Limits) -> list[Check]:
     """Peaks of the set-points' derivatives at the servo period, and the workspace.
 
+    The peaks are those of the stroke, unless one on the ways to it and off it is over a limit: ways
+    are as fast as they may be, and would hide how near to its limits the stroke comes.
+
     Parameters
     ----------
     plan : Plan
@@ -149,35 +158,108 @@ def within_limits(plan: Plan, stroke: Stroke, limits: Limits) -> list[Check]:
         (limits.rotation_speed, limits.rotation_acceleration, limits.rotation_jerk),
     )
     checks = []
-    for order, derivative in enumerate(plan.derivatives(), start=1):
-        size = np.linalg.norm(derivative, axis=-1)
+    for order, size in enumerate(plan.sizes, start=1):
         for kind, (word, unit) in enumerate((("", "mm/s"), ("rotation ", "rad/s"))):
-            at = int(np.argmax(size[:, kind])) if len(size) else 0
-            value = float(size[at, kind]) if len(size) else 0.0
             limit = allowed[kind][order - 1]
+            at = _peak(size[:, kind], plan.lead, plan.last + order - 1, limit)
+            value = float(size[at, kind]) if len(size) else 0.0
+            t, row, place = _where(plan, stroke, min(at, len(plan) - 1))
             checks.append(
                 Check(
                     f"{word}{names[order - 1]}",
                     value,
                     limit,
                     unit + ("", "²", "³")[order - 1],
-                    *_where(plan, stroke, min(at, len(plan) - 1)),
+                    t,
+                    row,
                     _slower(
                         value,
                         limit,
                         order,
                         f"--max-{word.strip() + '-' if word else ''}{names[order - 1]}",
                     ),
+                    place,
                 )
             )
     return checks + _inside(plan, stroke, limits)
 
 
+def by_joints(
+    plan: Plan, stroke: Stroke, reach: Reach, start: Floats | None
+) -> tuple[list[Check], Floats | None]:
+    """Reach, joint angles and joint speeds of a plan; an arm that misses a pose has no others.
+
+    Parameters
+    ----------
+    plan : Plan
+    stroke : Stroke
+        Names the rows.
+    reach : Reach
+    start : array, shape (6,), or None
+        Joint angles before, rad; None for the best.
+
+    Returns
+    -------
+    list of Check
+    array, shape (6,), or None
+        Joint angles after; None where the arm does not get there.
+    """
+    followed = reach.follow(plan.position[None], plan.rotation[None], plan.period, start)
+    after = followed.joints[0, -1] if followed.missing.passed[0] else None
+    return _by_joints(plan, stroke, followed), after
+
+
+def _by_joints(plan: Plan, stroke: Stroke, followed: Followed) -> list[Check]:
+    def check(quantity: str, unit: str, peak: Peak, remedy: str) -> Check:
+        value, limit = float(peak.value[0]), float(peak.limit[0])
+        if unit != "mm":
+            value, limit = float(np.degrees(value)), float(np.degrees(limit))
+        t, row, place = _where(plan, stroke, int(peak.sample[0]))
+        return Check(quantity, value, limit, unit, t, row, remedy, place)
+
+    away = "move the stroke nearer to the arm's base or further from its axis, or check --tool"
+    reach = check("distance out of the arm's reach", "mm", followed.missing, away)
+    if not reach.passed:
+        return [reach]
+    angle, speed = followed.angle, followed.speed
+    near = "".join(f"it is {clause}; " for clause in singular(followed.nearness[0]))
+    if followed.jumps[0]:
+        slower = "no --speed helps, for it jumps: "
+    else:
+        slower = _slow_down(speed.limit[0] / max(speed.value[0], speed.limit[0]))
+    return [
+        reach,
+        check(
+            f"joint {angle.joint[0] + 1} from the middle of its range",
+            "°",
+            angle,
+            "turn or move the stroke, or start the arm in another configuration",
+        ),
+        check(
+            f"speed of joint {speed.joint[0] + 1}",
+            "°/s",
+            speed,
+            f"{near}{slower}move or turn the stroke",
+        ),
+    ]
+
+
+def _peak(size: Floats, first: int, end: int, limit: float) -> int:
+    """Number of the largest value of a stroke, or of all where that is over the limit."""
+    if not size.max(initial=0.0) <= limit:
+        return int(np.argmax(size))
+    return first + int(np.argmax(size[first:end])) if end > first else 0
+
+
 def _slower(value: float, limit: float, order: int, option: str) -> str:
     # The n-th derivative goes with the n-th power of the speed.
-    factor = np.floor(100.0 * (limit / value) ** (1.0 / order)) / 100.0 if value > limit else 1.0
-    slower = f"slow it down to {factor:g} times its speed with --speed, or " if factor > 0 else ""
-    return f"{slower}raise {option} if the arm may"
+    share = (limit / value) ** (1.0 / order) if value > limit else 1.0
+    return f"{_slow_down(share)}raise {option} if the arm may"
+
+
+def _slow_down(share: float) -> str:
+    factor = np.floor(100.0 * share) / 100.0
+    return f"slow it down to {factor:g} times its speed with --speed, or " if factor > 0 else ""
 
 
 def _inside(plan: Plan, stroke: Stroke, limits: Limits) -> list[Check]:
@@ -185,21 +267,24 @@ def _inside(plan: Plan, stroke: Stroke, limits: Limits) -> list[Check]:
         return []
     low, high = np.array(limits.workspace[::2]), np.array(limits.workspace[1::2])
     outside = np.maximum(np.maximum(low - plan.position, plan.position - high), 0.0)
-    at = np.argmax(outside, axis=0)
-    return [
-        Check(
-            f"distance outside the workspace in {axis}",
-            float(outside[at[i], i]),
-            0.0,
-            "mm",
-            *_where(plan, stroke, int(at[i])),
-            f"move the stroke, or widen --workspace ({axis} {low[i]:g} to {high[i]:g} mm)",
+    checks = []
+    for i, axis in enumerate("xyz"):
+        at = int(np.argmax(outside[:, i]))
+        t, row, place = _where(plan, stroke, at)
+        other = ", lower --clearance" if plan.phase_at(at) in ("transfer", "retract") else ""
+        remedy = (
+            f"move the stroke{other}, or widen --workspace ({axis} {low[i]:g} to {high[i]:g} mm)"
         )
-        for i, axis in enumerate("xyz")
-    ]
+        quantity = f"distance outside the workspace in {axis}"
+        value = float(outside[at, i])
+        checks.append(Check(quantity, value, 0.0, "mm", t, row, remedy, place))
+    return checks
 
 
-def _where(plan: Plan, stroke: Stroke, index: int) -> tuple[float, int]:
+def _where(plan: Plan, stroke: Stroke, index: int) -> tuple[float | None, int | None, str]:
+    """Return time and row on the stroke, or the way that leads to it or off it."""
+    if not plan.draws_at(index):
+        return None, None, f"in the {plan.phase_at(index)}"
     t = float(plan.t[index])
     nearest = int(np.searchsorted(stroke.t - stroke.t[0], t - 1e-9))
-    return t, stroke.first_row + min(nearest, len(stroke.t) - 1)
+    return t, stroke.first_row + min(nearest, len(stroke.t) - 1), ""

@@ -1,26 +1,33 @@
 """What one execution is made of: mock scene, checked plan, sense of touch, run file."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
-from dmpcli.errors import InputError, RefusedError
+import numpy as np
+
+from dmpcli.errors import InputError
+from dmpcli.instruments import guards
+from dmpcli.instruments.conversion import PoseServo
 from dmpcli.instruments.mock import Plate, Scene
-from dmpcli.instruments.protocols import Clock, RobotState, Sensor
+from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
 from dmpcli.instruments.sensing import Sensing
-from dmpcli.measures.timing import punctuality
+from dmpcli.kinematics import models
+from dmpcli.measures.contact import contact
 from dmpcli.primitives.compensation import Compensation
 from dmpcli.primitives.coupling import Filter, fast_filter
+from dmpcli.primitives.reach import Reach
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.streaming import plan as planning
-from dmpcli.streaming import preflight, run_file
-from dmpcli.streaming.contact import Pressing, Touch
+from dmpcli.streaming import preflight
+from dmpcli.streaming.contact import LONG, Pressing, Touch
 from dmpcli.streaming.loop import DONE, Arm, Loop, Outcome, Watch
 from dmpcli.streaming.plan import Plan, Stroke
 from dmpcli.streaming.preflight import Check
-from dmpcli.streaming.settings import ExecuteSettings
+from dmpcli.streaming.settings import COUPLED, ExecuteSettings
+from dmpcli.streaming.stroke_file import Batch
 
 SENSOR_RATE = 100.0
 # A zero is taken over this time, s.
@@ -48,7 +55,7 @@ def scene(stroke: Stroke, presses: bool) -> Scene:
 
 
 def prepare(
-    stroke: Stroke, settings: ExecuteSettings, state: RobotState
+    stroke: Stroke, settings: ExecuteSettings, state: RobotState, reach: Reach | None = None
 ) -> tuple[Plan, list[Check]]:
     """Plan the stroke from where the arm stands, and judge it.
 
@@ -57,6 +64,8 @@ def prepare(
     stroke : Stroke
     settings : ExecuteSettings
     state : RobotState
+    reach : Reach, optional
+        The arm whose joints are judged too, from where they are if the state tells it.
 
     Returns
     -------
@@ -69,8 +78,7 @@ def prepare(
     RefusedError
         The arm is not ready.
     """
-    if state.mode != "ready":
-        raise RefusedError(f"robot: {state.mode}; clear it on the pendant before it may move")
+    guards.check_ready(state)
     start = (state.position, state.rotation)
     goal = stroke.rotation[0] if stroke.rotation is not None else state.rotation
     checks = preflight.at_rest(stroke, settings.speed, settings.period, settings.limits)
@@ -87,7 +95,35 @@ def prepare(
         start,
         settings.approach or settings.lead_speed,
     )
-    return made, checks + preflight.within_limits(made, stroke, settings.limits)
+    checks += preflight.within_limits(made, stroke, settings.limits)
+    if reach is not None:
+        standing = reach.standing(state.joints, *start)
+        checks += preflight.by_joints(made, stroke, reach, standing)[0]
+    return made, checks
+
+
+def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None:
+    """Return the arm whose joints can be judged: the one that is named, else the robot's own.
+
+    Parameters
+    ----------
+    robot : Servo
+        Open.
+    model : str, optional
+        Its kinematic model, as asked for.
+    tool : Tool, optional
+
+    Raises
+    ------
+    InputError
+        The model is not known, or is not the robot's.
+    """
+    own = robot.reach if isinstance(robot, PoseServo) else None
+    if model is None or own is None:
+        return own if model is None else Reach(models.model(model), tool)
+    if own.arm is not models.model(model):
+        raise InputError(f"--robot-model {model}: the robot is an {own.arm.name}; leave it out")
+    return own
 
 
 def check_period(arm: Arm, period: float) -> None:
@@ -100,7 +136,8 @@ def check_period(arm: Arm, period: float) -> None:
     shortest, longest = arm.info.period_range
     if not shortest <= period <= longest:
         raise InputError(
-            f"--period {period:g}: the {arm.info.make} robot takes {shortest:g} to {longest:g} s"
+            f"--period {period:g}: the {arm.info.make} robot takes {shortest:g} to {longest:g} s "
+            f"with its look-ahead of {arm.info.lookahead:g} s"
         )
 
 
@@ -109,8 +146,9 @@ def touch(
     tool: Tool,
     plan: Plan,
     settings: ExecuteSettings,
-    clock: Clock,
+    arm: Arm,
     coupling: Filter | None,
+    tool_check: float | None = None,
 ) -> Touch:
     """Let the sensor stream at rest, and return what the loop feels with.
 
@@ -121,21 +159,28 @@ def touch(
         Where its zero is None, it is taken now.
     plan : Plan
     settings : ExecuteSettings
-    clock : Clock
+    arm : Arm
     coupling : Filter, optional
         None: only log the wrench.
+    tool_check : float, optional
+        By how much the tool's zero may miss the reading at rest, N; None does not check it.
 
     Raises
     ------
+    RefusedError
+        The tool's zero and payload do not explain the reading.
     InstrumentError
         The sensor cannot be reached, is silent, or sends what must not be believed.
     """
     info = sensor.open()
     rate = min(SENSOR_RATE, info.rate)
     sensor.start(rate)
-    sensing = Sensing(sensor, info, rate, plan.period, clock)
-    zeroed = sensing.zeroed(tool, plan.rotation[0], ZERO_TIME)
-    pressing = None if coupling is None else Pressing(settings.law(), coupling, plan)
+    sensing = Sensing(sensor, info, rate, plan.period, arm.clock)
+    zeroed = sensing.zeroed(tool, plan.rotation[0], ZERO_TIME, tool_check)
+    pressing = None
+    if coupling is not None:
+        lookahead = arm.info.lookahead
+        pressing = Pressing(settings.law(lookahead), coupling, plan, lookahead)
     return Touch(sensing, Compensation(zeroed), pressing)
 
 
@@ -160,14 +205,57 @@ def coupling_filter(stroke: Stroke, facts: Mapping[str, Any], settings: ExecuteS
     return fast_filter(tau / settings.speed, settings.period)
 
 
-def facts_of(coupling: Filter) -> dict[str, float]:
-    """Return the gains that were chosen on the normal axis."""
-    return {"k": coupling.k, "d": coupling.d, "tau": coupling.tau, "alpha_e": coupling.alpha_e}
+def coupling_of(batch: Batch, settings: ExecuteSettings) -> Filter:
+    """Return the filter for all strokes of a run: their time constants differ in no case.
+
+    Raises
+    ------
+    InputError
+        As `coupling_filter`, for any of them.
+    """
+    filters = [coupling_filter(found.stroke, found.facts, settings) for found in batch.found]
+    return filters[0]
+
+
+def facts_of(arm: Arm, coupling: Filter | None, settings: ExecuteSettings) -> dict[str, Any]:
+    """Return the arm's look-ahead and the gains that were chosen on the normal axis."""
+    lookahead = arm.info.lookahead
+    if isinstance(arm.servo, PlanPlayer):
+        return {}  # its look-ahead is the most that it may take to begin
+    if coupling is None:
+        return {"lookahead": lookahead}
+    gains = {"k": coupling.k, "d": coupling.d, "tau": coupling.tau, "alpha_e": coupling.alpha_e}
+    model = settings.law(lookahead).model
+    of_model = {"mass": float(model.mass[0]), "damping": float(model.damping[0])}
+    return {"lookahead": lookahead, "coupling": gains | of_model}
+
+
+def slowed(lookahead: float) -> str:
+    """Say that the arm answers too late for a quick force coupling; empty where it does not."""
+    if lookahead <= LONG:
+        return ""
+    return (
+        f"--coupling force: behind a look-ahead of {lookahead:g} s the force is corrected "
+        f"{lookahead / COUPLED:.2g} times as slowly; lookahead={COUPLED:g} in --robot is better"
+    )
+
+
+def pressed(pressing: Pressing) -> str:
+    """Say how hard the coupling pressed, and for how much of the stroke it did not."""
+    if not pressing.felt:
+        return "no stroke was drawn under force"
+    how = contact(np.array(pressing.felt), pressing.law.contact)
+    return (
+        f"force along the normal {how.mean:.2f} N in the mean, {how.least:.2f} to "
+        f"{how.largest:.2f} N; no contact on {100.0 * how.absent:.3g} % of the stroke"
+    )
 
 
 def watch(settings: ExecuteSettings) -> Watch:
     """Return when the loop stops by itself."""
-    return Watch(settings.following_error, settings.following_angle, settings.max_force)
+    return Watch(
+        settings.following_error, settings.following_angle, settings.max_force, settings.max_torque
+    )
 
 
 def record_of(loop: Loop, outcome: Outcome, provenance: Provenance, realtime: bool) -> Record:
@@ -183,13 +271,28 @@ def record_of(loop: Loop, outcome: Outcome, provenance: Provenance, realtime: bo
     realtime : bool
         Lateness is a fact only where a clock ran: a simulated run is the same every time.
     """
-    columns = run_file.columns(loop.log, loop.plan.oriented, loop.senses, loop.presses)
-    facts = dict(provenance.facts) | {
+    facts = provenance.facts | {
         "reason": outcome.reason,
         "completed": outcome.reason == DONE,
-        "missed": outcome.missed,
+        "missed": loop.pace.missed,
     }
     if realtime:
-        found = punctuality(columns["deadline"], columns["lateness"], loop.plan.period)
-        facts["lateness"] = {"p50": found.median, "p99": found.p99, "max": found.worst}
-    return Record(schemas.RUN, columns, replace(provenance, facts=facts))
+        facts |= loop.pace.facts()
+    if loop.pressing is not None and loop.pressing.felt:
+        felt = np.array(loop.pressing.felt)
+        facts["contact"] = asdict(contact(felt, loop.pressing.law.contact))
+    if "strokes" in facts:
+        facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
+    return Record(schemas.RUN, loop.log.columns(), replace(provenance, facts=facts))
+
+
+def progress_of(ids: Sequence[str], drawn: Sequence[str]) -> dict[str, list[str]]:
+    """Return what the file of a run of many strokes says at its end: ``drawn``, ``remaining``.
+
+    Parameters
+    ----------
+    ids, drawn : sequence of str
+        All strokes of the run in order, and those that are whole.
+    """
+    done = set(drawn)
+    return {"drawn": list(drawn), "remaining": [name for name in ids if name not in done]}

@@ -20,6 +20,9 @@ Workspace = Annotated[
     AfterValidator(guards.ordered),
 ]
 
+COUPLED = 0.1
+"""Look-ahead that the coupling's mass and damping are for, s."""
+
 
 class ExecuteSettings(Settings):
     """Settings of `execute`, in mm, rad, s and N.
@@ -45,15 +48,24 @@ class ExecuteSettings(Settings):
     start_angle: Positive = 0.035
     lead_speed: Positive = 20.0
     approach: Positive | None = None
+    # Between strokes. 20 mm are more than any coupling's clamp; through the air less than half the
+    # reduced speed, off the work a fifth of it as nothing is in the way, onto it lead_speed.
+    clearance: Annotated[float, Field(ge=1, le=1e4)] | None = None
+    transfer_speed: Positive = 100.0
+    retract_speed: Positive = 50.0
     # Distance of the actual pose from every set-point of the last look-ahead and a tenth of a
     # second: what a look-ahead delays is no error, what stands still or strays is.
     following_error: Positive = 5.0
     following_angle: Positive = 0.1
     max_force: Positive = 50.0
+    max_torque: Positive = 5.0
+    # What a tool file's zero may miss at rest, N, and N·m at 0.1 m; see RecordSettings.
+    tool_check: Positive = 1.5
     # Of a marking pen; a polishing pad wants more.
     force_setpoint: Positive = 5.0
     # M/D = 40 ms and no spring: the force settles at the set-point without a steady error, on a
-    # plate of 5 N/mm behind 0.1 s of delay within about a second. It seeks at F_d/D.
+    # plate of 5 N/mm behind 0.1 s of look-ahead within about a second. It seeks at F_d/D. A longer
+    # look-ahead raises M and D in proportion: the stiffest plate that is stable has about D/delay.
     coupling_mass: Positive = 0.08
     coupling_damping: Positive = 2.0
     coupling_stiffness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
@@ -75,8 +87,13 @@ class ExecuteSettings(Settings):
             self.workspace,
         )
 
-    def law(self) -> Law:
+    def law(self, lookahead: float = 0.0) -> Law:
         """The admittance model of the force coupling.
+
+        Parameters
+        ----------
+        lookahead : float
+            Of the arm, s; beyond `COUPLED` the model is slowed down in proportion.
 
         Raises
         ------
@@ -88,9 +105,10 @@ class ExecuteSettings(Settings):
                 f"--force-setpoint {self.force_setpoint:g}: is not below --max-force "
                 f"{self.max_force:g}, at which the run stops"
             )
+        slow = max(lookahead / COUPLED, 1.0)
         model = admittance.Law(
-            np.array([self.coupling_mass]),
-            np.array([self.coupling_damping]),
+            np.array([slow * self.coupling_mass]),
+            np.array([slow * self.coupling_damping]),
             np.array([self.coupling_stiffness]),
             self.period,
         )

@@ -1,13 +1,14 @@
-"""One stroke out of a trajectory file, or out of the folder of a batch."""
+"""The strokes of a trajectory file, or of the folder of a batch, that are to be executed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas, streams
 from dmpcli.records.pairs import OK
@@ -15,7 +16,8 @@ from dmpcli.records.record import Record
 from dmpcli.rotations import from_euler
 from dmpcli.streaming.plan import Stroke
 
-_NAMED = 5
+NAMED = 5
+"""Ids that a message names."""
 
 
 @dataclass(frozen=True)
@@ -27,67 +29,116 @@ class Found:
     stroke : Stroke
     facts : dict
         Of the file, with the start, goal and normal of a batch's pair.
-    source : Record
-        The file, for the provenance.
     """
 
     stroke: Stroke
     facts: dict[str, Any]
-    source: Record
 
 
-def find(path: str, wanted: str | None) -> Found:
-    """Read the stroke that is to be executed.
+@dataclass(frozen=True)
+class Batch:
+    """The strokes that are to be executed.
+
+    Attributes
+    ----------
+    found : tuple of Found
+        In the order in which they are drawn; at least one.
+    failed : dict of str
+        Pairs of the batch without trajectory that were passed over, and why each has none.
+    entries : tuple of dict
+        The files, for the provenance.
+    folder : bool
+        Whether it is a batch's folder.
+    """
+
+    found: tuple[Found, ...]
+    failed: dict[str, str]
+    entries: tuple[dict[str, str], ...]
+    folder: bool
+
+    @property
+    def strokes(self) -> list[Stroke]:
+        """The strokes alone."""
+        return [found.stroke for found in self.found]
+
+
+def find(path: str, wanted: Sequence[str] = ()) -> Batch:
+    """Read the strokes that are to be executed.
 
     Parameters
     ----------
     path : str
         A trajectory file, ``-``, or a batch's folder.
-    wanted : str, optional
-        The id; needed where there are several.
+    wanted : sequence of str
+        Their ids, in the order in which they are drawn; none means all, in the file's order.
 
     Raises
     ------
     InputError
-        Several strokes and no id, no such id, a pair without trajectory, or a file that cannot be
-        streamed; names column and row.
+        No such id, or one twice; a pair without trajectory that was asked for, or nothing but
+        such pairs; or a file that cannot be streamed, with column and row.
     """
-    if path == streams.DASH or not Path(path).is_dir():
-        return _in_file(path, wanted, {})
-    folder = Path(path)
-    pairs = record.decode(streams.read(folder / streams.TABLE), schemas.PAIRS)
-    row = _row_of(pairs, wanted, path)
-    name, status = str(pairs.columns["id"][row]), str(pairs.columns["status"][row])
-    if status != OK or "part" not in pairs.columns:
-        raise InputError(f"{path}: pair {name} has no trajectory: {status}")
-    return _in_file(str(folder / str(pairs.columns["part"][row])), name, _pair_facts(pairs, row))
+    twice = [name for i, name in enumerate(wanted) if name in wanted[:i]]
+    if twice:
+        raise InputError(f"--id {twice[0]}: is given twice; a stroke is drawn once in a run")
+    if path != streams.DASH and Path(path).is_dir():
+        return _in_folder(Path(path), wanted)
+    source, rows = _grouped(path)
+    names = _chosen(wanted, list(rows), source.name)
+    found = tuple(_found(source, name, rows[name], {}) for name in names)
+    return Batch(found, {}, (record.input_of("trajectory", source),), False)
 
 
-def _row_of(pairs: Record, wanted: str | None, path: str) -> int:
-    ids = pairs.columns["id"].astype(str)
-    usable = ids[pairs.columns["status"].astype(str) == OK]
-    rows = np.flatnonzero(ids == _choose(usable, wanted, path, ids))
-    return int(rows[0])
+def _in_folder(folder: Path, wanted: Sequence[str]) -> Batch:
+    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
+    ids = [str(name) for name in pairs.columns["id"]]
+    parts = pairs.columns.get("part", np.full(len(pairs), None))
+    rows_of = {name: row for row, name in enumerate(ids)}
+    failed = {
+        name: str(status)
+        for name, status, part in zip(ids, pairs.columns["status"], parts, strict=True)
+        if status != OK or not part
+    }
+    chosen = _chosen(wanted, list(rows_of), str(folder))
+    names = [name for name in chosen if name not in failed]
+    if wanted and len(names) < len(chosen):
+        name = next(name for name in chosen if name in failed)
+        raise InputError(f"{folder}: pair {name} has no trajectory: {failed[name]}")
+    if not names:
+        name, why = next(iter(failed.items()))
+        raise InputError(f"{folder}: no pair has a trajectory; the first, {name}: {why}")
+    found, entries = {}, [record.input_of("pairs", pairs)]
+    in_part: dict[str, list[str]] = {}
+    for name in names:
+        in_part.setdefault(str(parts[rows_of[name]]), []).append(name)
+    # Part by part: the strokes that are drawn stay in memory, the rest of a part does not.
+    for part, members in in_part.items():
+        source, rows = _grouped(str(folder / part))
+        entries.append(record.input_of("trajectory", source))
+        for name in members:
+            if name not in rows:
+                raise InputError(
+                    f"{source.name}: holds no stroke {name}, which {streams.TABLE} says is there; "
+                    "generalize the batch again"
+                )
+            found[name] = _found(source, name, rows[name], _pair_facts(pairs, rows_of[name]))
+    strokes = tuple(found[name] for name in names)
+    return Batch(strokes, {} if wanted else failed, tuple(entries), True)
 
 
-def _choose(
-    usable: np.ndarray[Any, Any], wanted: str | None, path: str, known: np.ndarray[Any, Any]
-) -> str:
-    """Return the id to execute."""
-    if wanted is not None:
-        if wanted not in known:
-            raise InputError(f"{path}: no stroke has the id {wanted}; it has {_listed(known)}")
-        return wanted
-    if len(usable) != 1:
-        raise InputError(
-            f"{path}: holds {len(usable)} strokes; pick one with --id ({_listed(usable)})"
-        )
-    return str(usable[0])
+def _chosen(wanted: Sequence[str], known: Sequence[str], path: str) -> list[str]:
+    """Return the ids to execute."""
+    there = set(known)
+    for name in wanted:
+        if name not in there:
+            raise InputError(f"{path}: no stroke has the id {name}; it has {listed(known)}")
+    return list(wanted) or list(known)
 
 
-def _listed(ids: np.ndarray[Any, Any]) -> str:
-    names = ", ".join(map(str, ids[:_NAMED]))
-    return names + (", ..." if len(ids) > _NAMED else "")
+def listed(ids: Sequence[str]) -> str:
+    """Name some ids, and of many how many more there are."""
+    more = len(ids) - NAMED
+    return ", ".join(ids[:NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _pair_facts(pairs: Record, row: int) -> dict[str, Any]:
@@ -101,12 +152,18 @@ def _pair_facts(pairs: Record, row: int) -> dict[str, Any]:
     return facts
 
 
-def _in_file(path: str, wanted: str | None, more: Mapping[str, Any]) -> Found:
+def _grouped(path: str) -> tuple[Record, dict[str, Integers]]:
+    """Read a trajectory file; return it with the rows of each id, in order of appearance."""
     source = record.decode(streams.read(path), schemas.TRAJECTORY)
-    ids = source.columns["id"].astype(str)
-    known = ids[np.sort(np.unique(ids, return_index=True)[1])]
-    name = _choose(known, wanted, source.name, known)
-    rows = np.flatnonzero(ids == name)
+    ids = source.columns["id"]
+    borders = np.flatnonzero(np.concatenate([[True], ids[1:] != ids[:-1], [True]]))
+    runs: dict[str, list[Integers]] = {}
+    for first, last in pairwise(borders.tolist()):
+        runs.setdefault(str(ids[first]), []).append(np.arange(first, last))
+    return source, {name: np.concatenate(rows) for name, rows in runs.items()}
+
+
+def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> Found:
     facts = dict(source.provenance.facts) | dict(more)
     t = source.t[rows]
     if len(t) < 2:
@@ -127,7 +184,7 @@ def _in_file(path: str, wanted: str | None, more: Mapping[str, Any]) -> Found:
         _normals(source, rows, facts),
         int(rows[0]) + 1,
     )
-    return Found(stroke, facts, source)
+    return Found(stroke, facts)
 
 
 def _optional(source: Record, names: tuple[str, ...], rows: Any) -> Floats | None:

@@ -203,7 +203,8 @@ def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):
         (("--period", 1.0), "--period 1"),
         (("--max-jerk", "inf"), "--max-jerk"),
         (("--workspace", 0, -1, 0, 1, 0, 1), "workspace"),
-        (("--robot", "elite://10.0.0.1"), "elite"),
+        (("--robot", "elite://10.0.0.1?look=1"), "look: there is no such option; elite has"),
+        (("--robot", "alien://10.0.0.1"), "no such instrument; a robot is one of mock:, elite://"),
         (("--robot", "nonsense"), "nonsense"),
         (("--force-setpoint", 5), "--coupling force"),
         (("--coupling", "force", "--force-setpoint", 50), "is not below --max-force"),
@@ -268,15 +269,13 @@ def test_a_file_of_another_schema_is_refused(tmp_path):
     assert "trajectory file is needed" in refused(other, "-o", tmp_path / "r.parquet", code=2)
 
 
-def test_several_strokes_need_an_id(tmp_path):
+def test_one_of_several_strokes_is_picked_by_id(tmp_path):
     first, second = columns(name="a"), columns(duration=5.0, name="b")
     traj = written(
         tmp_path / "traj.parquet", {k: np.concatenate([first[k], second[k]]) for k in first}
     )
     out = tmp_path / "run.parquet"
-    line = refused(traj, "-o", out, code=2, output=out)
-    assert "2 strokes" in line
-    assert "--id (a, b)" in line
+    assert "it has a, b" in refused(traj, "-o", out, "--id", "c", code=2, output=out)
     execute(traj, "-o", out, "--id", "b")
     assert np.count_nonzero(run_of(out).columns["phase"] == "stroke") == 251
     assert run_of(out).provenance.options["id"] == "b"
@@ -306,10 +305,10 @@ def batch(tmp_path):
 
 def test_one_stroke_of_a_batch_is_picked_by_id(batch, tmp_path):
     out = tmp_path / "run.parquet"
-    assert "--id (a, b)" in refused(batch, "-o", out, code=2, output=out)
     assert "3 mm off the plane" in refused(batch, "-o", out, "--id", "c", code=2, output=out)
     execute(batch, "-o", out, "--id", "b", "--coupling", "force", "--force-setpoint", 4)
-    assert run_of(out).provenance.facts["trajectory"]["normal"] == [0.0, 0.0, 1.0]
+    (stroke,) = run_of(out).provenance.facts["strokes"]
+    assert (stroke["id"], stroke["normal"]) == ("b", [0.0, 0.0, 1.0])
 
 
 EXTREME = st.one_of(
@@ -320,6 +319,9 @@ NUMBERS = {
     "--speed": 1,
     "--period": 1,
     "--approach": 1,
+    "--clearance": 1,
+    "--transfer-speed": 1,
+    "--retract-speed": 1,
     "--start-tolerance": 1,
     "--workspace": 6,
     "--max-speed": 1,
@@ -345,6 +347,8 @@ def test_no_finite_number_ends_in_a_traceback(short, option, data):
     values = [repr(data.draw(EXTREME)) for _ in range(NUMBERS[option])]
     if option == "--force-setpoint":
         values += ["--coupling", "force"]
+    if option in ("--transfer-speed", "--retract-speed"):
+        values += ["--clearance", "20"]
     asked = ["execute", str(short), "-o", "-", "--robot", "mock:?x=-550", option, *values]
     result = CliRunner().invoke(app, asked)
     assert result.exit_code in (0, 2, 3, 4), result.exception
@@ -367,9 +371,20 @@ def test_a_fault_stops_the_run_and_keeps_its_rows(traj, tmp_path, robot, code, w
     result = execute(traj, "-o", out, "--robot", robot, expect=code)
     assert words in result.stderr.splitlines()[-1]
     run = run_of(out)
+    assert f"{out}: {len(run)} rows kept" in result.stderr
     assert 50 < len(run) < 400
     assert words in run.provenance.facts["reason"]
     assert not run.provenance.facts["completed"]
+
+
+def test_a_run_that_goes_on_is_not_disturbed_by_another_of_its_name(traj, tmp_path, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("the instruments were reached")
+
+    monkeypatch.setattr("dmpcli.instruments.urls.connect", never)
+    (tmp_path / "run.parquet.journal").touch()
+    result = execute(traj, "-o", tmp_path / "run.parquet", "--realtime", expect=2)
+    assert "dmpcli recover" in result.stderr
 
 
 def test_a_sensor_that_falls_silent_stops_the_run(traj, tmp_path):
@@ -409,10 +424,16 @@ def test_a_sensor_is_logged_compensated(traj, tmp_path):
 def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tmp_path, height):
     out = tmp_path / "run.parquet"
     options = ("--coupling", "force", "--force-setpoint", 5, "--robot", f"mock:?plate={height}")
-    execute(traj, "-o", out, *options)
+    result = execute(traj, "-o", out, *options)
     run = run_of(out)
     stroke = run.columns["phase"] == "stroke"
     force = run.columns["fz"][stroke]
+    said = run.provenance.facts["contact"]
+    assert said["mean"] == pytest.approx(force.mean(), abs=0.01)
+    assert (said["absent"], said["threshold"]) == (0.0, 0.5)
+    assert f"force along the normal {said['mean']:.2f} N in the mean" in result.stderr
+    assert "no contact on 0 % of the stroke" in result.stderr
+    assert "look-ahead" not in result.stderr
     assert np.sqrt(np.mean((force - 5.0) ** 2)) < 0.15
     assert force.min() > 4.0
     depth = height - run.columns["z"][stroke]
@@ -421,6 +442,19 @@ def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tm
     assert gains["k"] == pytest.approx(gains["d"] ** 2 / 4)
     assert gains["alpha_e"] == pytest.approx(gains["k"] / gains["d"])
     assert gains["tau"] == 5.0
+
+
+def test_behind_a_long_look_ahead_the_coupling_is_slowed_and_it_is_said(traj, tmp_path):
+    out = tmp_path / "run.parquet"
+    preset = tmp_path / "slow.toml"
+    preset.write_text("[execute]\nfollowing_error = 20\n")
+    options = ("--coupling", "force", "--force-setpoint", 3, "--config", preset)
+    result = execute(traj, "-o", out, *options, "--robot", "mock:?lag=0.28")
+    facts = run_of(out).provenance.facts
+    assert facts["lookahead"] == pytest.approx(0.3)
+    assert facts["coupling"]["damping"] == pytest.approx(3.0 * 2.0)
+    assert "behind a look-ahead of 0.3 s" in result.stderr
+    assert facts["contact"]["absent"] == 0.0
 
 
 def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_path):
@@ -436,7 +470,7 @@ def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_pa
 def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
     out = tmp_path / "run.parquet"
     out.write_bytes(b"older")
-    request = Request(str(traj), None, str(out), "mock:", None, None, *[False] * 5)
+    request = Request(str(traj), (), str(out), "mock:", None, None, None, *[False] * 5)
     with pytest.raises(InputError, match="--force replaces it"):
         _check_output(request, repeatable=False)
     _check_output(dataclasses.replace(request, force=True), repeatable=False)
@@ -485,6 +519,7 @@ def test_a_signal_decelerates_and_keeps_the_run(traj, tmp_path, number, code):
     assert on_path.max() < 0.01
     assert run.provenance.facts["lateness"]["p50"] < 0.02
     assert not run.provenance.facts["completed"]
+    assert f"{out}: {len(run)} rows kept" in errors
 
 
 def test_a_second_ctrl_c_stops_at_once(traj, tmp_path):

@@ -6,6 +6,7 @@ from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.rotations import from_euler
 from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.plan import Plan, Stroke, make
+from dmpcli.streaming.run_file import Row
 
 PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
 START = np.array([-551.030, 131.399, -17.560])
@@ -66,14 +67,19 @@ class FakeClock:
 
 
 class FakeServo:
-    """Reaches each set-point one period later; `at` maps a state reading's number to a deed."""
+    """Reaches each set-point one period later; `at` maps a cycle's number to a deed.
 
-    def __init__(self, clock, position=START, rotation=PEN_DOWN, lookahead=0.2, at=None):
+    Cycle -1 is the look at where the arm stands once it has been started.
+    """
+
+    def __init__(
+        self, clock, position=START, rotation=PEN_DOWN, lookahead=0.2, at=None, queues=False
+    ):
         self.clock = clock
         self.position, self.rotation = np.array(position), np.array(rotation)
-        self.info = ServoInfo("fake", (0.002, 0.1), lookahead)
+        self.info = ServoInfo("fake", (0.002, 0.1), lookahead, queues)
         self.at = dict(at or {})
-        self.reads = 0
+        self.reads = -1
         self.sent = []
         self.calls = []
         self.mode = "ready"
@@ -105,3 +111,24 @@ class FakeServo:
 
     def close(self):
         self.calls.append("close")
+
+
+def rows_of(log):
+    """The rows of a run's log, one by one."""
+    rows = log.rows
+    count = len(rows)
+    poses = [
+        list(zip(rows.numbers(name), rows.rotations(f"{name}_rotation"), strict=True))
+        for name in ("planned", "sent", "actual")
+    ]
+    wrench = [None] * count
+    if "wrench" in rows.groups:
+        wrench = [None if np.isnan(w).all() else w for w in rows.numbers("wrench")]
+    coupling = rows.numbers("coupling") if "coupling" in rows.groups else np.zeros(count)
+    t, t_plan, deadline, lateness = (
+        rows.numbers(name) for name in ("t", "t_plan", "deadline", "lateness")
+    )
+    ids = [word or None for word in rows.words("id")]
+    columns = (t, t_plan, *poses, deadline, lateness, wrench, coupling)
+    words = (rows.words("state"), rows.words("phase"), ids)
+    return [Row(*row) for row in zip(*columns, *words, strict=True)]

@@ -1,3 +1,5 @@
+from collections import deque
+
 import numpy as np
 import pytest
 from streaming_fakes import START, plan, stroke
@@ -8,7 +10,8 @@ from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law, fast_filter
 from dmpcli.rotations import from_euler
-from dmpcli.streaming.contact import Pressing, Touch
+from dmpcli.streaming.contact import SETTLED_TIME, Pressing, Touch
+from dmpcli.streaming.settings import ExecuteSettings
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)
@@ -44,6 +47,12 @@ def touch(*batches):
 
 def test_the_mean_since_the_last_cycle_is_felt():
     assert touch([sample(0.0, 4.0), sample(0.01, 6.0)]).feel(state(), 0.01)[2] == 5.0
+
+
+def test_what_a_long_wait_has_gathered_does_not_hide_what_is_felt_now():
+    waited = [sample(0.01 * k, 0.0) for k in range(500)]
+    felt = touch([*waited, *(sample(5.0 + 0.01 * k, 8.0) for k in range(4))])
+    assert felt.feel(state(), 5.04)[2] == 8.0
 
 
 def test_without_a_new_sample_the_last_one_holds_while_it_is_fresh():
@@ -131,6 +140,78 @@ def test_it_gives_up_in_the_end_however_slow_it_is():
     for _ in range(round(61 / PERIOD)):
         press.displace(0.0, push(UP, 2.0))
     assert "does not settle" in press.given_up
+
+
+class LateArm:
+    """Presses on a plate of 5 N/mm that lies 0.2 mm deeper than the plan says."""
+
+    def __init__(self, lookahead, gap=0.2):
+        law = ExecuteSettings(force_setpoint=3.0).law(lookahead)
+        self.press = Pressing(law, fast_filter(5.0, PERIOD), plan(stroke(normal=UP)), lookahead)
+        # Beside its look-ahead an arm lags by a period or two, and so does the sensor.
+        self.underway = deque([0.0] * (round(lookahead / PERIOD) + 3))
+        self.gap, self.force = gap, 0.0
+
+    def step(self):
+        self.underway.append(self.press.displace(0.0, push(UP, self.force))[2])
+        self.force = 5.0 * max(-self.gap - self.underway.popleft(), 0.0)
+        return self.force
+
+    def settle(self):
+        """Forces until it has settled."""
+        forces = []
+        while not self.press.settled:
+            assert self.press.given_up == ""
+            forces.append(self.step())
+        return forces
+
+
+@pytest.mark.parametrize("lookahead", [0.02, 0.1, 0.2, 0.3, 0.5])
+def test_the_force_settles_without_losing_contact_however_long_the_look_ahead(lookahead):
+    arm = LateArm(lookahead)
+    forces = np.array(arm.settle() + [arm.step() for _ in range(500)])
+    touched = np.flatnonzero(forces)[0]
+    assert forces[touched + 1 :].min() > 0.0
+    assert forces.max() < 4.5
+    np.testing.assert_allclose(forces[-250:], 3.0, atol=0.1)
+
+
+def test_a_contact_that_is_lost_before_the_force_has_settled_is_sought_again():
+    arm = LateArm(0.1)
+    while arm.force < 1.0:
+        arm.step()
+    arm.step()
+    arm.gap += 0.5
+    arm.settle()
+    assert abs(arm.force - 3.0) <= 0.3
+
+
+def test_a_contact_that_is_lost_later_is_left():
+    arm = LateArm(0.1)
+    arm.settle()
+    arm.step()
+    arm.gap = 100.0
+    for _ in range(200):
+        arm.step()
+    assert arm.press.e == 0.0
+
+
+def test_the_force_has_settled_only_once_it_stayed_for_the_look_ahead():
+    late = Pressing(law(), fast_filter(5.0, PERIOD), plan(stroke(normal=UP)), 0.4)
+    for _ in range(19):
+        late.displace(0.0, push(UP, 5.0))
+    assert not late.settled
+    assert 19 * PERIOD > SETTLED_TIME
+    late.displace(0.0, push(UP, 5.0))
+    late.displace(0.0, push(UP, 5.0))
+    assert late.settled
+
+
+def test_a_force_that_does_not_settle_behind_a_long_look_ahead_is_blamed_on_it():
+    late = Pressing(law(), fast_filter(5.0, PERIOD), plan(stroke(normal=UP)), 0.4)
+    for _ in range(round(11 / PERIOD)):
+        late.displace(0.0, push(UP, 2.0))
+    assert "behind a look-ahead of 0.4 s" in late.given_up
 
 
 def test_a_plan_that_lifts_off_releases_e():

@@ -74,6 +74,17 @@ def test_a_missing_orientation_holds_the_arms():
     assert not made.oriented
 
 
+def test_what_lies_far_off_does_not_count_between_two_set_points():
+    """So it takes no longer on a long plan than on a short one when the loop first brakes."""
+    made = plan(stroke(turn=0.8))
+    expected = made.at(200.5)
+    for part in (made.position, made.rotation):
+        part[:150], part[250:] = np.nan, np.nan
+    position, rotation = made.at(200.5)
+    np.testing.assert_array_equal(position, expected[0])
+    np.testing.assert_array_equal(rotation, expected[1])
+
+
 def test_between_two_set_points_the_plan_runs_on_the_curve():
     made = plan(stroke(turn=0.8))
     position, rotation = made.at(200.5)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from dmpcli.streaming.spline import spline
+from dmpcli.streaming.spline import WINDOW, between, spline, window
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 200])
@@ -28,3 +28,18 @@ def test_ends_hold_outside():
 
 def test_one_sample_stands_still():
     assert spline(np.array([0.0]), np.array([[4.0]]))(np.array(3.0)).tolist() == [4.0]
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, 30, 200])
+def test_between_even_samples_it_is_the_same_from_a_window(n):
+    y = np.random.default_rng(n).normal(size=(n, 7))
+    oracle = CubicSpline(np.arange(n), y, bc_type="clamped")
+    for index in np.linspace(0.0, n - 1.0, 41):
+        near, share = window(index, n)
+        np.testing.assert_allclose(between(y[near], share), oracle(index), rtol=0, atol=1e-11)
+
+
+def test_a_window_is_as_wide_in_a_long_record_as_in_a_short_one():
+    near, share = window(100_000.25, 200_001)
+    assert (near.min(), near.max()) == (100_000 - WINDOW, 100_001 + WINDOW)
+    assert share == pytest.approx(0.25)

@@ -1,0 +1,67 @@
+"""Messages and facts of a run of many strokes stay short however many there are."""
+
+import numpy as np
+import pytest
+from streaming_fakes import plan, stroke
+
+from dmpcli.errors import InputError, RefusedError
+from dmpcli.streaming import many
+from dmpcli.streaming.many import Judged
+from dmpcli.streaming.plan import Stroke
+from dmpcli.streaming.preflight import Check
+from dmpcli.streaming.settings import ExecuteSettings
+from dmpcli.streaming.stroke_file import Batch, Found
+
+
+def batch(*names, folder=True):
+    t, position = np.arange(3.0), np.zeros((3, 3))
+    found = [Found(Stroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]}) for name in names]
+    return Batch(tuple(found), {}, (), folder)
+
+
+def test_what_is_left_is_named_as_the_options_that_draw_it():
+    said = many.rest_of(batch("a", "b", "c"), ["b"])
+    assert said == "1 of 3 strokes are drawn; the rest: --id a --id c"
+
+
+def test_of_a_thousand_that_are_left_a_few_are_named():
+    names = [str(i) for i in range(1000)]
+    said = many.rest_of(batch(*names), names[:3])
+    assert said.startswith("3 of 1000 strokes are drawn; the rest: --id 3 --id 4 ")
+    assert said.endswith("and 989 more, which inspect lists")
+    assert len(said) < 160
+
+
+def test_of_a_thousand_that_fail_a_few_are_named():
+    bad = Check("speed", 9.0, 1.0, "mm/s", 0.5, 7, "slow it down")
+    judged = [Judged(plan(), [bad]) for _ in range(1000)]
+    with pytest.raises(RefusedError, match=r"^stroke 0: speed 9 .*1000 of 1000 strokes fail") as e:
+        many.refuse_any(judged)
+    assert str(e.value).endswith("0, 0, 0, 0, 0 and 995 more")
+
+
+def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():
+    plain, lifted = ExecuteSettings(), ExecuteSettings(clearance=5.0)
+    assert not many.lifts(batch("a", folder=False), plain)
+    assert many.lifts(batch("a", folder=False), lifted)
+    assert many.lifts(batch("a", "b", folder=False), plain)
+    assert many.lifts(batch("a"), plain)
+
+
+def test_the_set_points_wait_for_the_look_ahead():
+    between = many.ways(ExecuteSettings(), 0.15, presses=False)
+    assert (between.settling, between.clearance, between.spare) == (8, 20.0, 0.0)
+    assert many.ways(ExecuteSettings(), 0.0, presses=True).spare == 5.0
+    with pytest.raises(InputError, match="--clearance 5: must be over 5 mm"):
+        many.ways(ExecuteSettings(clearance=5.0), 0.0, presses=True)
+
+
+def test_the_facts_hold_each_strokes_own_ends_once():
+    facts = many.facts_of(batch("a", "b"))
+    assert facts["trajectory"] == {"tau": 2.0}
+    assert facts["strokes"][1] == {"id": "b", "start": [0, 0, 0]}
+
+
+def test_a_stroke_that_is_asked_to_wait_forever_names_the_option():
+    with pytest.raises(InputError, match="raise --speed"):
+        plan(stroke(), speed=1e-3, period=0.002)
