@@ -12,6 +12,10 @@ from dmpcli.arrays import Floats
 
 # Below this the series of sin(x)/x to second order is exact to rounding.
 _SMALL_ANGLE = 1e-4
+# Steps of an angle, rad, below which neither a full turn nor the other set of angles can be meant.
+_NEAR = 0.4 * np.pi
+# Samples that are worked on at once.
+_IN_CACHE = 1 << 13
 
 
 def from_euler(angles: Floats) -> Floats:
@@ -58,18 +62,28 @@ def to_euler(R: Floats) -> Floats:
         rx, rz in (-π, π], ry in [-π/2, π/2], rad. A pen that points straight down reads
         rx = +π whatever the sign of the rounding error.
     """
-    cy = np.hypot(R[..., 0, 0], R[..., 0, 1])
-    ry = np.arctan2(R[..., 0, 2], cy)
-    regular = cy > 1e-9
-    rx = np.where(
-        regular,
-        np.arctan2(-R[..., 1, 2], R[..., 2, 2]),
-        np.arctan2(R[..., 2, 1], R[..., 1, 1]),
+    return np.stack(_angles(np.moveaxis(R, (-2, -1), (0, 1))), axis=-1)
+
+
+def _angles(R: Floats) -> tuple[Floats, Floats, Floats]:
+    """Euler angles of rotations whose own axes are the first ones, shape (3, 3, ...)."""
+    cy = np.sqrt(R[0, 0] * R[0, 0] + R[0, 1] * R[0, 1])
+    rx = np.arctan2(-R[1, 2], R[2, 2])
+    ry = np.arctan2(R[0, 2], cy)
+    rz = np.arctan2(-R[0, 1], R[0, 0])
+    singular = cy <= 1e-9
+    if singular.any():
+        rx = np.where(singular, np.arctan2(R[2, 1], R[1, 1]), rx)
+        rz = np.where(singular, 0.0, rz)
+    return _from_plus_pi(rx), ry, _from_plus_pi(rz)
+
+
+def _from_plus_pi(angle: Floats) -> Floats:
+    """Read a half turn as +π, whatever the sign of its rounding error."""
+    low = -np.pi + 1e-9
+    return (
+        np.where(angle < low, angle + 2 * np.pi, angle) if angle.min(initial=0.0) < low else angle
     )
-    rz = np.where(regular, np.arctan2(-R[..., 0, 1], R[..., 0, 0]), 0.0)
-    angles = np.stack([rx, ry, rz], axis=-1)
-    angles[angles < -np.pi + 1e-9] += 2 * np.pi
-    return angles
 
 
 def to_euler_continuous(R: Floats) -> Floats:
@@ -89,17 +103,76 @@ def to_euler_continuous(R: Floats) -> Floats:
     array, shape (..., T, 3)
         rad; the first sample is that of `to_euler`.
     """
-    first = to_euler(R)
-    second = np.stack(
-        [first[..., 0] + np.pi, np.pi - first[..., 1], first[..., 2] + np.pi], axis=-1
+    return np.stack(_continuous(_angles(np.moveaxis(R, (-2, -1), (0, 1)))), axis=-1)
+
+
+def euler_of_products(C: Floats, M: Floats) -> Floats:
+    """Return `to_euler_continuous` of the paths C_b M(t), several times faster.
+
+    Parameters
+    ----------
+    C : array, shape (B, 3, 3)
+    M : array, shape (T, 3, 3)
+
+    Returns
+    -------
+    array, shape (B, T, 3)
+        rad.
+    """
+    count, samples = len(C), len(M)
+    path = np.ascontiguousarray(M.transpose(1, 2, 0)).reshape(3, 3 * samples)
+    angles = np.empty((3, count, samples))
+    # So many paths that what is in work stays in the processor's cache.
+    size = max(1, _IN_CACHE // samples)
+    for first in range(0, count, size):
+        part = C[first : first + size].transpose(1, 0, 2).reshape(-1, 3)
+        R = (part @ path).reshape(3, -1, 3, samples).swapaxes(1, 2)
+        angles[:, first : first + size] = _continuous(_angles(R))
+    return angles.transpose(1, 2, 0)
+
+
+def _continuous(angles: tuple[Floats, Floats, Floats]) -> tuple[Floats, ...]:
+    """Unwrap angles along their last axis; see `to_euler_continuous`."""
+    if angles[0].shape[-1] < 2:
+        return angles
+    steps = [angle[..., 1:] - angle[..., :-1] for angle in angles]
+    turns = [_turns(step) for step in steps]
+    largest = max(
+        _largest(step if turn is None else step - 2 * np.pi * turn)
+        for step, turn in zip(steps, turns, strict=True)
     )
-    if first.shape[-2] > 1:
-        stay = np.abs(_wrapped(np.diff(first, axis=-2))).sum(axis=-1)
-        change = np.abs(_wrapped(second[..., 1:, :] - first[..., :-1, :])).sum(axis=-1)
-        swapped = np.zeros(first.shape[:-1], dtype=bool)
-        swapped[..., 1:] = np.cumsum(change < stay, axis=-1) % 2 == 1
-        first = np.where(swapped[..., None], second, first)
-    return np.unwrap(first, axis=-2)
+    # With steps s below this the other set is further away, 2π - 2s against 3s at most.
+    if largest < _NEAR:
+        return tuple(map(_unwound, angles, turns))
+    return _nearest_sets(angles)
+
+
+def _turns(step: Floats) -> Floats | None:
+    """Full turns in the steps of an angle; None where there are none."""
+    return np.rint(step / (2 * np.pi)) if _largest(step) >= _NEAR else None
+
+
+def _largest(values: Floats) -> float:
+    return max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
+
+
+def _unwound(angle: Floats, turns: Floats | None) -> Floats:
+    if turns is None:
+        return angle
+    angle = angle.copy()
+    angle[..., 1:] -= 2 * np.pi * np.cumsum(turns, axis=-1)
+    return angle
+
+
+def _nearest_sets(angles: tuple[Floats, Floats, Floats]) -> tuple[Floats, ...]:
+    """Choose between both sets sample by sample, then unwrap."""
+    first = np.stack(angles)
+    second = np.stack([first[0] + np.pi, np.pi - first[1], first[2] + np.pi])
+    stay = np.abs(_wrapped(np.diff(first))).sum(axis=0)
+    change = np.abs(_wrapped(second[..., 1:] - first[..., :-1])).sum(axis=0)
+    swapped = np.zeros(first.shape[1:], dtype=bool)
+    swapped[..., 1:] = np.cumsum(change < stay, axis=-1) % 2 == 1
+    return tuple(np.unwrap(np.where(swapped, second, first)))
 
 
 def _wrapped(angles: Floats) -> Floats:
@@ -269,6 +342,9 @@ def skew(v: Floats) -> Floats:
     array, shape (..., 3, 3)
     """
     v = np.asarray(v, dtype=float)
+    if v.ndim == 1:  # several times faster, for control loops
+        x, y, z = v.tolist()
+        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     K = np.zeros((*v.shape[:-1], 3, 3))
     K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]

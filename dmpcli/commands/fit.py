@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def command(
         str | None,
         typer.Option(help="What rx ry rz are: euler or rotvec; or quaternion: qx qy qz qw."),
     ] = None,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Learn a skill from one or several demonstrations."""
     from dmpcli.commands.messages import about, tell

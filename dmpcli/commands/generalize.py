@@ -5,20 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.commands.options import Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.errors import InputError, RefusedError, counted
 
 if TYPE_CHECKING:
+    from dmpcli.batch.job import Task
     from dmpcli.primitives.admission import Admission
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
     from dmpcli.records.record import Provenance
     from dmpcli.surfaces.protocol import Surface
-
-SHOWN = 20
-"""Bad pairs that are named on the terminal; all are in the dataset's table."""
-
-Point = tuple[float, float, float]
 
 
 def command(
@@ -34,16 +31,18 @@ def command(
             show_default=False,
         ),
     ],
-    start: Annotated[Point | None, typer.Option(help="New start X Y Z, mm.")] = None,
-    goal: Annotated[Point | None, typer.Option(help="New goal X Y Z, mm.")] = None,
+    start: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New start, mm.")] = None,
+    goal: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New goal, mm.")] = None,
     reproduce: Annotated[
         bool, typer.Option("--reproduce", help="At the demonstrated start and goal.")
     ] = False,
     start_orientation: Annotated[
-        Point | None, typer.Option(help="Tool orientation at the start, RX RY RZ, rad.")
+        Point | None,
+        typer.Option(metavar="RX RY RZ", help="Tool orientation at the start, rad."),
     ] = None,
     goal_orientation: Annotated[
-        Point | None, typer.Option(help="Tool orientation at the goal, RX RY RZ, rad.")
+        Point | None,
+        typer.Option(metavar="RX RY RZ", help="Tool orientation at the goal, rad."),
     ] = None,
     pairs: Annotated[
         Path | None,
@@ -53,16 +52,8 @@ def command(
         Path | None,
         typer.Option(help="What to draw on: plane.json (point and normal), or an STL, OBJ or PLY."),
     ] = None,
-    surface_pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X Y Z RX RY RZ|pose.json",
-            help="Where the surface's own frame lies in the base frame, mm and rad.",
-        ),
-    ] = None,
-    surface_unit: Annotated[
-        str | None, typer.Option(help="Unit of a mesh file: mm (default), cm, m or in.")
-    ] = None,
+    surface_pose: SurfacePose = None,
+    surface_unit: SurfaceUnit = None,
     on_border: Annotated[
         str,
         typer.Option(help="A stroke that leaves the surface: fail, clip it there, or skip it."),
@@ -90,13 +81,44 @@ def command(
             help="A bad pair stops all before anything is written (default), or is skipped.",
         ),
     ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes that draw a table of pairs (1).")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="Draw on a Dask cluster."),
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Draw only every N-th part, from the I-th on."),
+    ] = None,
+    pairs_per_part: Annotated[
+        int | None, typer.Option(help="Pairs in one file of the folder (2000).")
+    ] = None,
+    float32: Annotated[
+        bool, typer.Option("--float32", help="Store poses in single precision.")
+    ] = False,
+    compression: Annotated[
+        str | None, typer.Option(metavar="zstd|lz4|snappy|none", help="Of the parts (zstd).")
+    ] = None,
+    robot_model: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66."),
+    ] = None,
+    tool: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Tool file: where the TCP is on the arm's flange."),
+    ] = None,
     preset: Annotated[
         str | None, typer.Option(help="TOML file with a [generalize] section.")
     ] = None,
     config: Annotated[Path | None, typer.Option(help="The same; beats the preset.")] = None,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw a skill at new start and goal points."""
+    from dmpcli.batch.job import Task
+    from dmpcli.commands import batches
+    from dmpcli.commands.generalize_inputs import facing_tool, one_pair, reach_of, surface_at
     from dmpcli.records import skill as skill_file
     from dmpcli.records import streams
     from dmpcli.records.generalize_settings import GeneralizeSettings
@@ -118,11 +140,9 @@ def command(
         preset,
         config,
     )
-    if on_error is not None and pairs is None:
-        raise InputError("--on-error: belongs to --pairs; leave it out")
-    on_error = on_error or "stop"
-    if on_error not in ("stop", "skip"):
-        raise InputError(f"--on-error {on_error}: must be stop or skip")
+    wanted = batches.asked(
+        pairs, on_error, jobs, cluster, shard, pairs_per_part, float32, compression
+    )
     if pairs is not None and (start_orientation or goal_orientation):
         raise InputError(
             "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
@@ -133,6 +153,10 @@ def command(
     if surface is None and (surface_pose is not None or surface_unit is not None):
         raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
     _check_destination(output, start, goal, pairs, reproduce)
+    if wanted.jobs > 1:
+        from dmpcli.batch import nursery
+
+        nursery.begin()
     source = streams.read(skill)
     learned, _ = skill_file.decode(source)
     if reproduce:
@@ -142,11 +166,12 @@ def command(
     found = None
     if surface is not None:
         options |= {"surface_unit": surface_unit or "mm", "on_border": on_border}
-        found = _surface(surface, surface_pose, surface_unit, options, inputs, quiet)
+        found = surface_at(surface, surface_pose, surface_unit, options, inputs, quiet)
+    reach = reach_of(robot_model, tool, learned.oriented, options, inputs, quiet)
     if pairs is None:
         assert start is not None
         assert goal is not None
-        table = _one_pair(start, goal, start_orientation, goal_orientation)
+        table = one_pair(start, goal, start_orientation, goal_orientation)
         options |= {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
         from dmpcli.records import pairs as pair_file
@@ -154,17 +179,17 @@ def command(
         pairs_source = streams.read(pairs)
         table = pair_file.read(pairs_source)
         inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
-        options["on_error"] = on_error
+        options |= wanted.options
     _check_asked(learned, table, settings)
-    given = None if found is None else _facing(found, learned, table, str(surface), quiet)
-    _judge(learned, table, given, settings, on_error)
+    given = None if found is None else facing_tool(found, learned, table, str(surface), quiet)
+    _judge(learned, table, given, settings, wanted.stop)
     provenance = Provenance("generalize", options, tuple(inputs))
+    task = Task(learned, given, settings.style(), on_border, reach)
+    lasting = _durations(learned, table, settings)
     if pairs is None:
-        _write_one(learned, table, given, settings, provenance, output, on_border, quiet)
+        _write_one(task, table, lasting, provenance, output, quiet)
     else:
-        _write_batch(
-            learned, table, given, settings, provenance, output, on_error, on_border, quiet
-        )
+        batches.write(task, table, lasting, provenance, output, wanted, quiet)
 
 
 def _check_destination(
@@ -198,87 +223,6 @@ def _check_destination(
         )
 
 
-def _one_pair(
-    start: Point, goal: Point, start_orientation: Point | None, goal_orientation: Point | None
-) -> "PairTable":
-    import numpy as np
-
-    from dmpcli import rotations
-    from dmpcli.commands.options import within
-    from dmpcli.primitives.generalization import Pairs
-    from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
-
-    def rotation(name: str, angles: Point | None) -> Any:
-        if angles is None:
-            return None
-        within(name, angles, LARGEST_ANGLE)
-        return rotations.from_euler(np.array([angles]))
-
-    return PairTable(
-        "--start and --goal",
-        ["1"],
-        Pairs(
-            np.array([start]),
-            np.array([goal]),
-            rotation("--start-orientation", start_orientation),
-            rotation("--goal-orientation", goal_orientation),
-        ),
-        [""],
-        np.array([np.nan]),
-        [OK],
-    )
-
-
-def _surface(
-    path: Path,
-    pose: str | None,
-    unit: str | None,
-    options: dict[str, Any],
-    inputs: list[dict[str, str]],
-    quiet: bool,
-) -> "Surface":
-    """Read the surface, place it in the base frame, and say what is odd about it."""
-    from dmpcli.commands.messages import tell
-    from dmpcli.records import mesh as mesh_file
-    from dmpcli.records import pose as pose_file
-    from dmpcli.records import streams, surface
-    from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.plane import Plane
-
-    source = streams.read(path)
-    inputs.append({"role": "surface", "sha256": source.sha256})
-    placed = None
-    if pose is not None:
-        placed, pose_source = pose_file.parse(pose, "--surface-pose")
-        if pose_source is None:
-            options["surface_pose"] = [float(word) for word in pose.split()]
-        else:
-            inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
-    found = surface.load(source, unit, placed)
-    if isinstance(found, Plane):
-        return found
-    for remark in found.remarks:
-        tell(f"{path}: {remark}", quiet)
-    tell(f"{path}: {mesh_file.summary(found)}", quiet)
-    return Mesh(found.V, found.F)
-
-
-def _facing(
-    surface: "Surface", skill: "Skill", table: "PairTable", name: str, quiet: bool
-) -> "Surface":
-    """Turn a plane's normal to the tool's side, and say so where that flips it."""
-    from dmpcli.commands.messages import tell
-    from dmpcli.primitives.admission import tool_axis
-    from dmpcli.surfaces.plane import Plane
-
-    if not isinstance(surface, Plane):
-        return surface  # the charts of a mesh look for the tool's side at each start
-    facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
-    if facing.normal @ surface.normal < 0:
-        tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
-    return facing
-
-
 def _check_asked(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> None:
     """Refuse what this skill cannot give, rather than pass over it."""
     asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
@@ -303,11 +247,12 @@ def _judge(
     table: "PairTable",
     given: "Surface | None",
     settings: "GeneralizeSettings",
-    on_error: str,
+    stop: bool,
 ) -> None:
     """Write what stands against a pair into its status; with `stop` the first one ends all."""
     import numpy as np
 
+    from dmpcli.commands.generalize_inputs import ENDS
     from dmpcli.primitives.admission import admit
     from dmpcli.records.pairs import OK
 
@@ -322,9 +267,9 @@ def _judge(
     )
     for i in np.flatnonzero(~verdict.admitted):
         row = int(rows[i])
-        place = f"{table.places[row]}, pair {table.ids[row]}: " if table.places[row] else ""
+        place = f"{table.place(row)}, pair {table.ids[row]}: " if table.name != ENDS else ""
         table.status[row] = place + _reason(verdict, int(i), settings.snap_tol)
-    if on_error == "skip":
+    if not stop:
         return
     upright = {int(rows[i]) for i in np.flatnonzero(verdict.upright)}
     for row, status in enumerate(table.status):
@@ -362,36 +307,40 @@ def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
     )
 
 
+def _remedy(status: str, on_surface: bool) -> str:
+    if "duration" in status:  # too fast for a joint
+        return "give a longer --duration"
+    return "move start and goal" + (", or choose another surface" if on_surface else "")
+
+
 def _write_one(
-    skill: "Skill",
+    task: "Task",
     table: "PairTable",
-    given: "Surface | None",
-    settings: "GeneralizeSettings",
+    duration: Any,
     provenance: "Provenance",
     output: Path,
-    on_border: str,
     quiet: bool,
 ) -> None:
     from dataclasses import replace
 
     import numpy as np
 
+    from dmpcli.batch.job import settle
     from dmpcli.commands.messages import about, tell, warn
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.drawing import draw
-    from dmpcli.records import dataset, record, streams, trajectory
+    from dmpcli.records import record, streams, trajectory
     from dmpcli.records.pairs import OK
 
+    given = task.surface
     pairs = table.pairs if given is None else snapped(table.pairs, given)
-    duration = _durations(skill, table, settings)
-    task = dataset.Task(skill, given, settings.style(), on_border)
     with about("skill"):
-        drawn = draw(skill, pairs, duration, given, task.style)[0]
-    stroke, status = dataset.settled(task, drawn)
+        [drawn] = draw(task.skill, pairs, duration, given, task.style)
+    [(stroke, status)] = settle(task, [drawn])
     if status != OK:
-        raise RefusedError(f"{status}; move start and goal, or choose another surface")
-    facts = trajectory.facts_of(skill) | trajectory.facts_of_stroke(
-        stroke, settings.rate, pairs.start[0], pairs.goal[0]
+        raise RefusedError(f"{status}; {_remedy(status, given is not None)}")
+    facts = trajectory.facts_of(task.skill) | trajectory.facts_of_stroke(
+        stroke, task.style.rate, pairs.start[0], pairs.goal[0]
     )
     done = trajectory.trajectory_record(table.ids, [stroke], replace(provenance, facts=facts))
     streams.write(output, record.encode(done))
@@ -409,54 +358,8 @@ def _write_one(
         warn(f"clipped at the border: {len(stroke.position)} of {len(drawn.position)} poses")
     miss = np.linalg.norm(stroke.position[-1] - pairs.goal[0])
     tell(
-        f"{streams.shown(output, output=True)}: {skill.model} DMP, {len(stroke.position)} poses, "
-        f"{stroke.timing.t[-1]:.3f} s at {settings.rate:g} Hz, ends {miss:.4f} mm from the goal",
+        f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
+        f"{counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "
+        f"{task.style.rate:g} Hz, ends {miss:.4f} mm from the goal",
         quiet,
     )
-
-
-def _write_batch(
-    skill: "Skill",
-    table: "PairTable",
-    given: "Surface | None",
-    settings: "GeneralizeSettings",
-    provenance: "Provenance",
-    output: Path,
-    on_error: str,
-    on_border: str,
-    quiet: bool,
-) -> None:
-    from dmpcli.commands.messages import about, progress, tell, warn
-    from dmpcli.primitives.admission import snapped
-    from dmpcli.records import dataset, streams
-    from dmpcli.records.pairs import OK
-
-    if not table.good.any():
-        raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
-    pairs = table.pairs if given is None else snapped(table.pairs, given)
-    task = dataset.Task(skill, given, settings.style(), on_border)
-    with progress("drawing", int(table.good.sum()), quiet) as advance, about("skill"):
-        unfolded = dataset.write(
-            output,
-            task,
-            table,
-            pairs,
-            _durations(skill, table, settings),
-            provenance,
-            on_error == "stop",
-            advance,
-        )
-    if unfolded:
-        warn(f"{unfolded} strokes cross a sharp crease, where no tool can follow the surface")
-    bad = [status for status in table.status if status != OK]
-    for status in bad[:SHOWN]:
-        tell(f"{table.name}: skipped: {status}", quiet)
-    if len(bad) > SHOWN:
-        tell(
-            f"{table.name}: and {len(bad) - SHOWN} more; {output}/{streams.TABLE} names all", quiet
-        )
-    summary = f"{output}: {len(table) - len(bad)} strokes drawn, {len(bad)} pairs skipped"
-    if bad:
-        warn(summary)
-    else:
-        tell(summary, quiet)

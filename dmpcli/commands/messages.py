@@ -19,11 +19,18 @@ def warn(message: str) -> None:
 
 
 @contextlib.contextmanager
-def about(name: str) -> Iterator[None]:
-    """Put a file's name before the messages of errors that mathematics raises about it."""
+def about(name: str, kind: type[DmpError] = DmpError) -> Iterator[None]:
+    """Put a file's name before the messages of errors that mathematics raises about it.
+
+    Parameters
+    ----------
+    name : str
+    kind : type of DmpError
+        Others are about something else, and pass as they are.
+    """
     try:
         yield
-    except DmpError as error:
+    except kind as error:
         raise type(error)(f"{name}: {error}") from None
 
 

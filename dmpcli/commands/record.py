@@ -5,21 +5,36 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.messages import tell
+from dmpcli.commands.messages import tell, warn
+from dmpcli.commands.options import (
+    AllowMixed,
+    FollowingError,
+    MaxForce,
+    MaxTorque,
+    Quiet,
+    Realtime,
+    Robot,
+    Sensor,
+    ToolCheck,
+    Workspace,
+)
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.drag.loop import Ending, Recorder
+    from dmpcli.drag.references import Reference
     from dmpcli.drag.settings import RecordSettings
+    from dmpcli.records.record import Provenance, Record
     from dmpcli.records.streams import Source
 
-Box = tuple[float, float, float, float, float, float]
+_TUTOR = ("reference", "start", "goal", "wave_height", "periods", "seed")
+"""Settings of the mock's hand, which mean nothing where a person draws."""
 
 
 def command(
     output: Annotated[str, typer.Option("--output", "-o", help="Demonstration; - is stdout.")],
-    sensor: Annotated[str, typer.Option(metavar="URL", help="mock: for now.")] = "mock:",
-    robot: Annotated[str, typer.Option(metavar="URL", help="mock: for now.")] = "mock:",
+    sensor: Sensor = "mock:",
+    robot: Robot = "mock:",
     tool: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Tool file; the mock knows its own.")
     ] = None,
@@ -49,23 +64,20 @@ def command(
         float | None, typer.Option(help="Of the sine, peak to trough, mm.")
     ] = None,
     periods: Annotated[float | None, typer.Option(help="Of the sine.")] = None,
-    following_error: Annotated[
-        float | None, typer.Option(metavar="MM", help="Stop when the arm strays further.")
-    ] = None,
-    workspace: Annotated[
-        Box | None,
-        typer.Option(metavar="XMIN XMAX YMIN YMAX ZMIN ZMAX", help="Box to stay in, mm."),
-    ] = None,
-    realtime: Annotated[bool, typer.Option("--realtime", help="Pace the mock.")] = False,
-    allow_mixed: Annotated[
-        bool, typer.Option("--allow-mixed", help="Let a real instrument stand beside a mock one.")
-    ] = False,
+    following_error: FollowingError = None,
+    tool_check: ToolCheck = None,
+    max_force: MaxForce = None,
+    max_torque: MaxTorque = None,
+    workspace: Workspace = None,
+    realtime: Realtime = False,
+    allow_mixed: AllowMixed = False,
     force: Annotated[
         bool, typer.Option("--force", help="Replace a recording from real instruments.")
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
+    from dmpcli.commands.keeping import Keeper
     from dmpcli.drag import enter, references, rehearsal
     from dmpcli.drag.loop import DEFECT, Ending, Recorder
     from dmpcli.drag.settings import RecordSettings, check
@@ -73,9 +85,11 @@ def command(
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.instruments.interruption import Interruption
     from dmpcli.instruments.mock import PEN
+    from dmpcli.instruments.watchdog import watched
     from dmpcli.records import settings as layers
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
+    from dmpcli.records.schemas import DEMONSTRATION
 
     given = {
         "drag": drag,
@@ -88,11 +102,15 @@ def command(
         "wave_height": wave_height,
         "periods": periods,
         "following_error": following_error,
+        "max_force": max_force,
+        "max_torque": max_torque,
+        "tool_check": tool_check,
         "workspace": workspace,
     }
     settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
     addresses = urls.check(robot, sensor, allow_mixed)
+    _check_tutored(given, urls.repeatable(addresses))
     urls.need_tool(addresses[1], tool is not None)
     repeatable = urls.repeatable(addresses)
     realtime = realtime or not repeatable
@@ -100,49 +118,74 @@ def command(
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)
     check_output(output, repeatable, force)
     tool_source = streams.read(tool) if tool else None
+    held = tool_file.decode(tool_source) if tool_source else None
     stroke = references.build(settings)
+    keeper = Keeper(output, realtime, quiet)
+    keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
     bench = urls.connect(
-        robot, sensor, clock, allow_mixed=allow_mixed, scene=rehearsal.scene(stroke, settings)
+        robot,
+        sensor,
+        clock,
+        allow_mixed=allow_mixed,
+        scene=rehearsal.scene(stroke, settings),
+        tool=held,
     )
+    if bench.note:
+        tell(bench.note, quiet)
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
     ending = Ending(DEFECT)
+    options = {
+        "robot": urls.in_provenance(robot),
+        "sensor": urls.in_provenance(sensor),
+        "realtime": realtime,
+    }
+    # Beside a real instrument a person draws, and nobody knows what.
+    tutored = None if bench.lab is None else stroke
+    provenance = _provenance(settings, options, bench.simulated, tool_source, tutored)
     # Entered until the file is there: a signal meanwhile must not cost the recording.
     with Interruption() as signals:
         recorder = Recorder(
-            bench.robot,
+            watched(bench.robot) if realtime else bench.robot,
             bench.sensor,
             clock,
-            tool_file.decode(tool_source) if tool_source else PEN.with_zero(None),
+            held or PEN.with_zero(None),
             settings,
             rehearsed.longest,
             signals,
             lambda: realtime and enter.pressed(),
             rehearsed.begin,
             rehearsed.lead_in,
+            keeper.hindrance,
+            warn,
         )
+        keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         try:
             with _status(realtime and not quiet):
                 ending = recorder.run()
         finally:
             if len(recorder.log):
-                options = {
-                    "robot": urls.in_provenance(robot),
-                    "sensor": urls.in_provenance(sensor),
-                    "realtime": realtime,
-                }
-                facts = {
-                    "simulated": bench.simulated,
-                    "reference": stroke.facts,
-                    "ended": ending.reason,
-                }
-                content = _file(recorder, settings, options, facts, tool_source, stroke.source)
-                streams.write(output, content)
+                keeper.keep(_recording(recorder, provenance, ending, realtime), ending.failure)
+            else:
+                keeper.drop()
+    if realtime:
+        tell(str(recorder.pace), quiet)
     tell(_summary(output, recorder, ending), quiet)
     if ending.failure is not None:
         raise ending.failure
     if signals.number is not None:
+        warn(ending.reason)
         raise typer.Exit(128 + signals.number)
+
+
+def _check_tutored(given: dict[str, Any], simulated: bool) -> None:
+    """Refuse what only the mock's tutor understands where a person drags a real tool."""
+    alone = next((key for key in _TUTOR if given[key] is not None), None)
+    if alone is not None and not simulated:
+        raise InputError(
+            f"--{alone.replace('_', '-')}: is of the mock's hand, and a person drags a real tool; "
+            "leave it out"
+        )
 
 
 def check_output(output: str, repeatable: bool, force: bool) -> None:
@@ -175,28 +218,44 @@ def _status(wanted: bool) -> Any:
     return Console(stderr=True).status("recording; Enter ends it")
 
 
-def _file(
-    recorder: "Recorder",
+def _provenance(
     settings: "RecordSettings",
     options: dict[str, Any],
-    facts: dict[str, Any],
+    simulated: bool,
     tool: "Source | None",
-    reference: "Source | None",
-) -> bytes:
-    from dmpcli.records.record import Provenance, Record, encode, input_of
-    from dmpcli.records.schemas import DEMONSTRATION
+    tutored: "Reference | None",
+) -> "Provenance":
+    """Return what is known of the recording before it is made; of the stroke only by the tutor."""
+    from dmpcli.records.record import Provenance, input_of
 
     settled = settings.model_dump(mode="json")
-    # The reference's name may be a path; what it holds stands in the inputs.
-    settled["reference"] = facts["reference"]["shape"]
-    sources = [("tool", tool), ("reference", reference)]
-    provenance = Provenance(
-        "record",
-        options=options | settled,
-        inputs=tuple(input_of(role, source) for role, source in sources if source),
-        facts=facts,
-    )
-    return encode(Record(DEMONSTRATION, recorder.log.columns(), provenance))
+    facts: dict[str, Any] = {"simulated": simulated}
+    sources = [("tool", tool)]
+    if tutored is None:
+        settled = {key: value for key, value in settled.items() if key not in _TUTOR}
+    else:
+        facts["reference"] = tutored.facts
+        # The reference's name may be a path; what it holds stands in the inputs.
+        settled["reference"] = tutored.facts["shape"]
+        sources.append(("reference", tutored.source))
+    inputs = tuple(input_of(role, source) for role, source in sources if source)
+    return Provenance("record", options | settled, inputs, facts)
+
+
+def _recording(
+    recorder: "Recorder", known: "Provenance", ending: "Ending", realtime: bool
+) -> "Record":
+    """Return the recording; how punctual it was is a fact only where a clock ran."""
+    from dataclasses import replace
+
+    from dmpcli.instruments.protocols import VIRTUAL
+    from dmpcli.records.record import Record
+    from dmpcli.records.schemas import DEMONSTRATION
+
+    facts = known.facts | {"ended": ending.reason} | (recorder.pace.facts() if realtime else {})
+    if recorder.sensor_info.serial == VIRTUAL:  # of a lab that `simulate` serves
+        facts["simulated"] = True
+    return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 
 
 def _summary(output: str, recorder: "Recorder", ending: "Ending") -> str:
@@ -206,7 +265,7 @@ def _summary(output: str, recorder: "Recorder", ending: "Ending") -> str:
         "asked": "it was asked to end",
     }
     name = "standard output" if output == "-" else output
-    late = f", {ending.missed} cycles missed" if ending.missed else ""
-    why = endings.get(ending.reason, "an instrument failed")
+    unless = "an instrument or a limit stopped it" if ending.failure else "a signal came"
+    why = endings.get(ending.reason, unless)
     log = recorder.log
-    return f"{name}: {len(log)} rows, {log.duration:.2f} s{late}; ended because {why}"
+    return f"{name}: {len(log)} rows, {log.duration:.2f} s; ended because {why}"

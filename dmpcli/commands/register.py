@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError, RefusedError
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def command(
     max_residual: Annotated[
         float, typer.Option(help="Largest distance of a touched point from the part, mm.")
     ] = 1.0,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Find where a part lies from points touched on it."""
     from dmpcli.commands.messages import about, tell

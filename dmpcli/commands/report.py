@@ -1,5 +1,7 @@
 """``dmpcli report``: by how much do the drawn strokes differ from the taught one."""
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,11 +11,14 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
+    from dmpcli.figures.batch import Tables
     from dmpcli.figures.document import Part
     from dmpcli.figures.footing import Ground
+    from dmpcli.figures.many import Sight
     from dmpcli.figures.measured import Row
 
 _WIDTH = 80
+_WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
 
 
 def command(
@@ -55,7 +60,7 @@ def command(
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     from dmpcli.commands.messages import tell
-    from dmpcli.figures import document, stroke
+    from dmpcli.figures import document, many, stroke
     from dmpcli.records import streams
 
     if files.count("-") > 1:
@@ -68,13 +73,16 @@ def command(
     if surface is not None:
         ground, said, normal = _ground(surface, surface_pose, surface_unit, quiet)
     labels = stroke.labels_of(files)
-    parts = [_part(name, label, normal) for name, label in zip(files, labels, strict=True)]
+    parts = [_part(name, label, normal, quiet) for name, label in zip(files, labels, strict=True)]
     if ground is not None:
         parts = _placed(parts, ground, quiet)
-    report = document.document(parts, said)
+    with _tables(output, any(part.batch for part in parts)) as tables:
+        sight = many.Sight(document.reference_of(parts), ground, normal)
+        parts = _measured(parts, sight, tables, quiet)
+        report = document.document(parts, said)
+        if output is not None:
+            written = _write(output, report, parts, ground)
     if output is not None:
-        _make_folder(output)
-        written = _write(output, report, parts, ground)
         tell(f"{output}: wrote {', '.join(written)}", quiet)
     if as_json:
         streams.say(document.as_json(report))
@@ -82,15 +90,15 @@ def command(
         streams.say(document.as_text(report, _width()).encode())
 
 
-def _part(name: str, label: str, normal: "Floats | None") -> "Part":
+def _part(name: str, label: str, normal: "Floats | None", quiet: bool) -> "Part":
     """Read one input, whatever it is."""
     from dmpcli.commands.messages import about
     from dmpcli.figures.document import Part
-    from dmpcli.figures.stroke import demonstrated, strokes_of
+    from dmpcli.figures.stroke import demonstrated, states_of, strokes_of
     from dmpcli.records import record, recordings, schemas, skill, streams
 
     if name != streams.DASH and Path(name).is_dir():
-        return _batch(Path(name), label, normal)
+        return _batch(Path(name), label, normal, quiet)
     source = streams.read(name)
     if source.content.lstrip()[:1] == b"{":
         return Part(label, source.sha256, skill.SCHEMA, skill=skill.decode(source)[1])
@@ -103,26 +111,32 @@ def _part(name: str, label: str, normal: "Floats | None") -> "Part":
                 label, source.sha256, kind, [demonstrated(recording, label, normal, origin)]
             )
     run = found if found.schema is schemas.RUN else None
+    states = None if run is None else states_of(run)
     with about(source.name):
-        return Part(label, source.sha256, found.schema.name, strokes_of(found, label, normal), run)
+        strokes = strokes_of(found, label, normal)
+    return Part(label, source.sha256, found.schema.name, strokes, run, states=states)
 
 
-def _batch(folder: Path, label: str, normal: "Floats | None") -> "Part":
-    """Read a batch: the pairs, and the parts that they name."""
-    from dmpcli.commands.messages import about
-    from dmpcli.figures.document import Part
+def _batch(folder: Path, label: str, normal: "Floats | None", quiet: bool) -> "Part":
+    """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
+    from dmpcli.commands.messages import about, tell
+    from dmpcli.figures.document import MOST_ROWS, Part
     from dmpcli.figures.stroke import pairs_of, strokes_of
-    from dmpcli.records import record, schemas, streams
+    from dmpcli.records import dataset, record, schemas, streams
 
-    source = streams.read(folder / streams.TABLE)
-    pairs = record.decode(source, schemas.PAIRS)
+    batch, odd = dataset.read(folder)
+    for remark in odd:
+        tell(remark, quiet)
+    if len(batch) > MOST_ROWS:
+        return Part(label, batch.sha256, schemas.PAIRS.name, batch=batch)
+    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
     strokes = []
-    for name in dict.fromkeys(part for part in pairs.columns.get("part", ()) if part):
+    for name in batch.files:
         part = record.decode(streams.read(folder / name), schemas.TRAJECTORY)
         with about(part.name):
             strokes += strokes_of(part, label, normal, known)
-    return Part(label, source.sha256, schemas.PAIRS.name, strokes, states=states)
+    return Part(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
 
 
 def _ground(
@@ -175,35 +189,72 @@ def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
     return done
 
 
-def _make_folder(output: Path) -> None:
-    """Make the folder of the report, or say why not."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise InputError(f"{output}: is a file, -o needs the name of a folder") from None
-    except OSError as error:
-        raise InputError(f"{output}: cannot be made: {error.strerror}") from None
+@contextlib.contextmanager
+def _tables(output: Path | None, batches: bool) -> "Iterator[Tables | None]":
+    """Open the tables that grow with the strokes; without a folder there are none."""
+    if output is None:
+        yield None
+        return
+    import csv
+
+    from dmpcli.figures.batch import STROKES, Tables
+    from dmpcli.figures.document import WAVES
+    from dmpcli.records.growing import growing
+
+    heads = {_WAVES: WAVES} | ({_STROKES: STROKES} if batches else {})
+    with growing(output, list(heads)) as (waves, *strokes):
+        for sink, head in zip((waves, *strokes), heads.values(), strict=True):
+            csv.writer(sink, lineterminator="\n").writerow(head)
+        yield Tables(waves, strokes[0] if strokes else None)
+
+
+def _measured(
+    parts: "list[Part]", sight: "Sight", tables: "Tables | None", quiet: bool
+) -> "list[Part]":
+    """Measure large batches, and write down the wave heights of all strokes."""
+    from dataclasses import replace
+
+    from dmpcli.commands.messages import progress
+    from dmpcli.figures.batch import measure
+    from dmpcli.figures.document import write_waves
+
+    done = []
+    total = sum(len(part.batch) for part in parts if part.batch)
+    with progress("measuring", total, quiet) as advance:
+        for part in parts:
+            if part.batch is None:
+                done.append(part)
+                if tables is not None:
+                    write_waves(part.strokes, tables.waves)
+                continue
+            many = measure(part.batch, part.name, sight, tables, advance)
+            done.append(replace(part, strokes=many.shown, many=many))
+    return done
 
 
 def _write(output: Path, report: "Row", parts: "list[Part]", ground: "Ground | None") -> list[str]:
     """Write each file whole; return their names."""
     from dmpcli.figures import document
+    from dmpcli.figures.batch_figures import batch_figures
     from dmpcli.figures.gallery import gallery
     from dmpcli.records import streams
 
     strokes = [stroke for part in parts for stroke in part.strokes]
     files = {
         "report.json": document.as_json(report),
-        "wave_heights.csv": document.as_csv(parts),
         **gallery(strokes, ground),
+        **batch_figures([part.many for part in parts if part.many]),
     }
     # Figures of an earlier report that this one does not draw would be taken for its own.
-    for old in output.glob("fig[0-9]_*.*"):
-        if old.name not in files:
+    for old in (*output.glob("fig[0-9]_*.*"), *output.glob("batch_*.*")):
+        if old.name not in files and old.suffix in (".svg", ".png"):
             old.unlink()
+    batches = any(part.many for part in parts)
+    if not batches:
+        (output / _STROKES).unlink(missing_ok=True)
     for name, content in files.items():
         streams.write(output / name, content)
-    return list(files)
+    return [*files, _WAVES, *([_STROKES] if batches else [])]
 
 
 def _width() -> int:

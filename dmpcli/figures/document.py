@@ -1,17 +1,19 @@
 """The report as one document of plain values, and its forms: JSON, tables, wave heights as CSV."""
 
 import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TextIO
 
 from rich.table import Table
 
 from dmpcli import __version__
-from dmpcli.figures import measured, paper_tables, tables
+from dmpcli.figures import contact, measured, paper_tables, tables
+from dmpcli.figures.batch import Many
 from dmpcli.figures.measured import Row
 from dmpcli.figures.stroke import Stroke
+from dmpcli.records.dataset import Batch
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
 from dmpcli.records.skill import SkillFile
@@ -54,6 +56,10 @@ class Part:
         Where it is one.
     states : dict, optional
         Of a batch: how many pairs ended in each status.
+    batch : Batch, optional
+        Of more than `MOST_ROWS` strokes.
+    many : Many, optional
+        Such a batch as measured; then `strokes` are those of them that are drawn.
     """
 
     name: str
@@ -63,6 +69,8 @@ class Part:
     run: Record | None = None
     skill: SkillFile | None = None
     states: dict[str, int] | None = None
+    batch: Batch | None = None
+    many: Many | None = None
 
 
 def reference_of(parts: Sequence[Part]) -> Stroke | None:
@@ -101,20 +109,19 @@ def as_json(report: Row) -> bytes:
     return f"{text}\n".encode()
 
 
-def as_csv(parts: Sequence[Part]) -> bytes:
-    """Return every wave height of every stroke as a row of a CSV file."""
-    sink = io.StringIO()
+WAVES = ["stroke", "role", "wave", "height_mm", "from_t_s", "to_t_s", "from_v_mm", "to_v_mm"]
+"""Header of the CSV file with a row per wave height."""
+
+
+def write_waves(strokes: Sequence[Stroke], sink: TextIO) -> None:
+    """Write every wave height of the strokes as a row of a CSV file."""
     rows = csv.writer(sink, lineterminator="\n")
-    rows.writerow(
-        ["stroke", "role", "wave", "height_mm", "from_t_s", "to_t_s", "from_v_mm", "to_v_mm"]
-    )
-    for stroke in (stroke for part in parts for stroke in part.strokes):
+    for stroke in strokes:
         wave = stroke.wave
         t = wave.at(stroke.t)
         for i, height in enumerate(wave.heights):
             values = (height, t[i], t[i + 1], wave.value[i], wave.value[i + 1])
             rows.writerow([stroke.label, stroke.role, i + 1, *(f"{x:.6f}" for x in values)])
-    return sink.getvalue().encode()
 
 
 def _counted(states: Mapping[str, int]) -> str:
@@ -138,11 +145,18 @@ def as_text(report: Row, width: int) -> str:
     for entry in report["files"]:
         if entry["statistics"]:
             parts += [tables.statistics(entry["file"], entry), ""]
+        if entry["worst"]:
+            parts += [tables.worst(entry["file"], entry), ""]
+        if entry["failures"]:
+            parts += [tables.failures(entry["file"], entry["failures"]), ""]
         if entry["states"]:
             parts += [f"{entry['file']}: {_counted(entry['states'])}", ""]
     runs = [(e["file"], e["deadlines"]) for e in report["files"] if e["deadlines"]]
     if runs:
         parts += [tables.deadlines(runs), ""]
+    pressed = [(e["file"], e["contact"]) for e in report["files"] if e["contact"]]
+    if pressed:
+        parts += [contact.table(pressed), ""]
     skills = [(e["file"], e["skill"]) for e in report["files"] if e["skill"]]
     if skills:
         parts += [tables.skills(skills), ""]
@@ -152,19 +166,25 @@ def as_text(report: Row, width: int) -> str:
 
 
 def _entry(part: Part, reference: Stroke | None) -> Row:
-    rows = [measured.row_of(stroke, reference) for stroke in part.strokes]
+    # A batch measured part by part says the same of its strokes together, and more.
+    rows = [] if part.many else [measured.row_of(stroke, reference) for stroke in part.strokes]
     many = len(rows) > MOST_ROWS
-    return {
+    entry = {
         "file": part.name,
         "sha256": part.sha256,
         "schema": part.schema,
         "count": len(rows),
         "strokes": [] if many else rows,
         "statistics": measured.statistics_of(rows) if many else None,
+        "histograms": None,
+        "worst": None,
         "states": part.states,
+        "failures": None,
         "deadlines": measured.deadlines_of(part.run) if part.run else None,
+        "contact": contact.contact_of(part.run) if part.run else None,
         "skill": measured.skill_of(part.skill) if part.skill else None,
     }
+    return entry | (part.many.entry() if part.many else {})
 
 
 def _rows(report: Row) -> list[Row]:

@@ -11,7 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError
+from dmpcli.errors import InputError, counted
 from dmpcli.figures import tables
 from dmpcli.figures.measured import Row
 from dmpcli.records import (
@@ -134,15 +134,16 @@ def _timing(found: record.Record) -> Row:
     if "t" not in found.columns:
         return {}
     t = found.t
-    ids = found.columns.get("id")
-    single = ids is None or bool(np.all(ids == ids[0]))
+    # A run has no id between its strokes.
+    names = {name for name in found.columns.get("id", ()) if name is not None}
     steps = np.diff(t)
     steps = steps[steps > 0.0]
-    timing: Row = {"rate": float(1.0 / np.median(steps)) if len(steps) else None}
-    if single:
+    # The mean: the steps of a recording over the wire are not alike.
+    timing: Row = {"rate": float(len(steps) / steps.sum()) if len(steps) else None}
+    if len(names) <= 1 or found.schema is schemas.RUN:
         timing["duration"] = float(t[-1] - t[0])
-    else:
-        timing["strokes"] = len(set(ids.tolist())) if ids is not None else 1
+    if len(names) > 1:
+        timing["strokes"] = len(names)
     return timing
 
 
@@ -166,7 +167,7 @@ def _json(source: Source) -> Row:
 _READERS: dict[Any, Callable[[Source], object]] = {
     "skill": skill.decode,
     "plane": plane.decode,
-    "tool": tool.decode,
+    "tool": tool.geometry,
     "pose": pose.decode,
 }
 """Their readers name what is wrong with a damaged file."""
@@ -252,7 +253,7 @@ def _mapping(names: Sequence[str]) -> dict[str, str | None]:
 
 
 def _extent(found: Row) -> str:
-    text = f"{found['rows']} rows"
+    text = counted(found["rows"], "row")
     if found.get("strokes"):
         text += f", {found['strokes']} strokes"
     if found.get("duration") is not None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.figures import lag
 from dmpcli.figures.stroke import Stroke
 from dmpcli.measures import path, surface
 from dmpcli.measures.deviation import deviation, nearest_distance
@@ -52,11 +53,11 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
         "sparc": _finite(spectral_arc_length(stroke.t, stroke.raw)),
         "start_error": start_error if stroke.intended else None,
         "goal_error": goal_error if stroke.intended else None,
-        "surface": _on_surface(stroke),
+        "surface": on_surface(stroke),
     }
 
 
-def _on_surface(stroke: Stroke) -> Row | None:
+def on_surface(stroke: Stroke) -> Row | None:
     """How a stroke lies on the report's surface; see `Footing`."""
     footing = stroke.footing
     if footing is None:
@@ -93,14 +94,15 @@ def _on_surface(stroke: Stroke) -> Row | None:
 
 
 def deadlines_of(run: Record) -> Row:
-    """Punctuality and tracking of a run, over all its servo cycles."""
+    """Punctuality of a run and tracking behind its look-ahead, over all its servo cycles."""
     lateness = np.asarray(run.columns["lateness"], dtype=float)
     deadline = np.asarray(run.columns["deadline"], dtype=float)
     period = float(np.median(np.diff(deadline))) if len(deadline) > 1 else math.inf
-    off = np.linalg.norm(run.position() - run.position("plan"), axis=1)
+    off = lag.tracking(run)
     return {
         "period": _finite(period),
         **asdict(punctuality(deadline, lateness, period)),
+        "lookahead": lag.lookahead_of(run),
         "tracking_rms": _rms(off),
         "tracking_max": float(off.max()),
     }
@@ -119,28 +121,56 @@ def skill_of(skill: SkillFile) -> Row:
 
 
 def statistics_of(rows: Sequence[Row]) -> Row:
-    """Least, median and largest of each figure over many strokes; None where none has it."""
+    """Distribution of each figure over many strokes; None where none has it."""
     values = {
         "wave_height": [row["wave"]["mean"] for row in rows],
-        "nearest_rms": [(row["deviation"] or {}).get("nearest_rms") for row in rows],
-        "nearest_max": [(row["deviation"] or {}).get("nearest_max") for row in rows],
+        "wave_spread": [row["wave"]["spread"] for row in rows],
+        **{
+            key: [(row["deviation"] or {}).get(key) for row in rows]
+            for key in ("nearest_rms", "nearest_max", "phase_rms", "phase_max")
+        },
         **{
             key: [row[key] for row in rows]
-            for key in ("length", "duration", "ldlj", "sparc", "start_error", "goal_error")
+            for key in (
+                *("length", "duration", "peak_speed", "ldlj", "sparc"),
+                *("start_error", "goal_error"),
+            )
         },
         **{
             f"surface_{key}": [(row["surface"] or {}).get(key) for row in rows]
-            for key in ("distance_max", "tilt_max", "length_change")
+            for key in ON_SURFACE
         },
     }
-    return {key: _spread([x for x in column if x is not None]) for key, column in values.items()}
+    return {
+        key: distribution(np.array([x for x in column if x is not None]))
+        for key, column in values.items()
+    }
 
 
-def _spread(values: list[float]) -> Row | None:
-    if not values:
+ON_SURFACE = (
+    *("wave_height", "distance_max", "distance_rms", "tilt_max", "tilt_mean"),
+    *("length_change", "goal_off", "start_off"),
+)
+"""Figures of a stroke on the report's surface that have statistics."""
+
+QUANTILES = (0.01, 0.05, 0.25, 0.75, 0.95, 0.99)
+
+
+def distribution(values: Floats) -> Row | None:
+    """Describe the values of one figure, shape (k,); None where there are none."""
+    if not len(values):
         return None
     least, median, largest = np.quantile(values, [0.0, 0.5, 1.0]).tolist()
-    return {"count": len(values), "least": least, "median": median, "largest": largest}
+    quantiles = np.quantile(values, QUANTILES).tolist()
+    return {
+        "count": len(values),
+        "least": least,
+        "median": median,
+        "largest": largest,
+        "mean": float(values.mean()),
+        "spread": float(values.std()),
+        "quantiles": dict(zip(map(str, QUANTILES), quantiles, strict=True)),
+    }
 
 
 def _wave(stroke: Stroke) -> Row:

@@ -30,13 +30,14 @@ def comparisons(strokes: Sequence[Stroke]) -> list[Row]:
     -------
     list of dict
         table, title, rows of ``name, stroke, role, paper, ours, difference``, and notes. Empty
-        unless a stroke was taught where the paper's was.
+        unless a stroke was taught where the paper's was, and not by a person at a real arm.
     """
     taught = next(
         (
             stroke
             for stroke in strokes
             if stroke.kind == "demonstration"
+            and stroke.staged
             and paper.experiment_at(stroke.start, stroke.goal) is REPRODUCTION
         ),
         None,

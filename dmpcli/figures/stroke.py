@@ -11,10 +11,12 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.figures import lag
 from dmpcli.measures.deviation import carried
 from dmpcli.measures.wave import WaveHeights, stroke_wave
 from dmpcli.primitives import preparation, references, smoothing
 from dmpcli.records import schemas
+from dmpcli.records.pairs import OK
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.streams import DASH
 from dmpcli.surfaces import plane
@@ -67,6 +69,8 @@ class Stroke:
         Normal on the tool's side where the stroke begins, as far as the file tells it.
     bound : bool
         Whether it was meant to lie on a surface: the original model knows none.
+    staged : bool
+        False for a recording of which nobody knows what was to be drawn: a person dragged.
     footing : Footing, optional
         How the stroke lies on a surface that it was measured on.
     """
@@ -87,6 +91,7 @@ class Stroke:
     rotation: Floats | None = None
     side: Floats | None = None
     bound: bool = True
+    staged: bool = True
     footing: "Footing | None" = None
 
     @cached_property
@@ -122,7 +127,7 @@ def strokes_of(
     normal: Floats | None = None,
     pairs: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> list[Stroke]:
-    """Return the strokes of a run, one, or of a trajectory file, one per id.
+    """Return the strokes of a run or of a trajectory file, one per id.
 
     Parameters
     ----------
@@ -142,9 +147,7 @@ def strokes_of(
     """
     facts = record.provenance.facts
     if record.schema is schemas.RUN:
-        drawn = _part(record, np.flatnonzero(record.columns["phase"] == "stroke"))
-        known = dict(facts.get("trajectory", facts))
-        return [_planned(drawn, label, "run", normal, known, "plan")]
+        return _drawn(record, label, normal)
     if record.schema is schemas.TRAJECTORY:
         groups, role = _by_id(record.columns["id"]), role_of(facts)
         strokes = []
@@ -154,6 +157,39 @@ def strokes_of(
             strokes.append(_planned(_part(record, rows), full, role, normal, known))
         return strokes
     raise InputError("holds start-goal pairs, not strokes; give the folder that it lies in")
+
+
+def _drawn(record: Record, label: str, normal: Floats | None) -> list[Stroke]:
+    """Return the strokes of a run in the order in which they were drawn.
+
+    Of several, one that was stopped within its first samples is none; `states_of` counts it.
+    """
+    facts = record.provenance.facts
+    rows = np.flatnonzero(record.columns["phase"] == "stroke")
+    groups = {"": rows}
+    if "id" in record.columns and len(rows):
+        groups = {name: rows[i] for name, i in _by_id(record.columns["id"][rows]).items()}
+    own = {said["id"]: said for said in facts.get("strokes", ())}
+    several = len(groups) > 1 or len(own) > 1
+    if several:
+        groups = {name: i for name, i in groups.items() if len(i) >= LEAST} or {"": rows[:0]}
+    strokes = []
+    for name, group in groups.items():
+        known = dict(facts.get("trajectory", facts)) | own.get(name, {})
+        full = f"{label}[{name}]" if several else label
+        drawn = lag.reached(record, group)
+        drawn = _part(drawn, np.arange(len(drawn.t)))
+        strokes.append(_planned(drawn, full, "run", normal, known, "plan"))
+    return strokes
+
+
+def states_of(run: Record) -> dict[str, int] | None:
+    """Return how many strokes of a run were drawn and how many were left; None for a single one."""
+    facts = run.provenance.facts
+    if "drawn" not in facts:
+        return None
+    left = len(facts["remaining"])
+    return {OK: len(facts["drawn"])} | ({"the run stopped before its end": left} if left else {})
 
 
 def role_of(facts: Mapping[str, Any]) -> str:
@@ -217,6 +253,7 @@ def demonstrated(
         bool(origin.facts.get("simulated", False)),
         # A noise-free stroke is its own guide.
         None if origin.facts.get("noise_free") else _guide(origin.facts.get("reference")),
+        staged=origin.command != "record" or "reference" in origin.facts,
     )
 
 

@@ -10,6 +10,12 @@ from dmpcli.figures.measured import Row
 
 _NOTHING = "-"
 
+WORST = 3
+"""Strokes that the table of the worst names for each figure; the document names more."""
+
+REASONS = 10
+"""Reasons for which pairs were not drawn that have a row of their own."""
+
 
 def number(value: float | None, digits: int) -> str:
     """Return a number with so many decimals, or a dash where there is none."""
@@ -144,7 +150,7 @@ def _percent(share: float | None) -> str:
 def deadlines(runs: Sequence[tuple[str, Row]]) -> Table:
     """Lateness of each run's set-points, and how closely the arm followed them."""
     table = _table(
-        "Deadlines, lateness in ms; tracking in mm",
+        "Deadlines, lateness in ms; tracking behind the look-ahead in mm",
         "run",
         *("cycles", "p50", "p99", "max", "missed", "track RMS", "track max"),
     )
@@ -160,29 +166,66 @@ def deadlines(runs: Sequence[tuple[str, Row]]) -> Table:
     return table
 
 
+FIGURES = {
+    "wave_height": ("wave height, mm", 3),
+    "nearest_rms": ("nearest RMS, mm", 4),
+    "nearest_max": ("nearest max, mm", 4),
+    "phase_rms": ("phase RMS, mm", 4),
+    "length": ("length, mm", 2),
+    "duration": ("time, s", 2),
+    "ldlj": ("LDLJ", 2),
+    "sparc": ("SPARC", 2),
+    "start_error": ("start off, mm", 4),
+    "goal_error": ("goal off, mm", 4),
+    "surface_distance_max": ("off the surface, mm", 4),
+    "surface_tilt_max": ("off the normal, degrees", 2),
+    "surface_length_change": ("length over demonstrated, 1", 5),
+}
+"""What tables call the figures of many strokes, and their decimals."""
+
+
 def statistics(name: str, row: Row) -> Table:
-    """Least, median and largest figure of a file of many strokes."""
-    table = _table(f"{name}: {row['count']} strokes", "figure", "least", "median", "largest")
-    for key, title, digits in (
-        ("wave_height", "wave height, mm", 3),
-        ("nearest_rms", "nearest RMS, mm", 4),
-        ("nearest_max", "nearest max, mm", 4),
-        ("length", "length, mm", 2),
-        ("duration", "time, s", 2),
-        ("ldlj", "LDLJ", 2),
-        ("sparc", "SPARC", 2),
-        ("start_error", "start off, mm", 4),
-        ("goal_error", "goal off, mm", 4),
-        ("surface_distance_max", "off the surface, mm", 4),
-        ("surface_tilt_max", "off the normal, degrees", 2),
-        ("surface_length_change", "length over demonstrated, 1", 5),
-    ):
+    """Distribution of each figure over a file of many strokes."""
+    table = _table(
+        f"{name}: {row['count']} strokes",
+        "figure",
+        *("least", "5 %", "median", "95 %", "largest", "spread"),
+    )
+    for key, (title, digits) in FIGURES.items():
         if key.startswith("surface") and row["statistics"][key] is None:
             continue
-        spread = row["statistics"][key] or {}
-        table.add_row(
-            title, *(number(spread.get(k), digits) for k in ("least", "median", "largest"))
-        )
+        spread = row["statistics"][key] or {"quantiles": {}}
+        quantiles = spread["quantiles"]
+        values = [spread.get("least"), quantiles.get("0.05"), spread.get("median")]
+        values += [quantiles.get("0.95"), spread.get("largest"), spread.get("spread")]
+        table.add_row(title, *(number(value, digits) for value in values))
+    return table
+
+
+def worst(name: str, entry: Row) -> Table:
+    """The worst strokes of a batch by each figure, the very worst first."""
+    table = _table(f"{name}: worst strokes", "figure", "value")
+    table.add_column("pair", overflow="fold")
+    table.add_column("part", overflow="fold")
+    for key, rows in entry["worst"].items():
+        title, digits = FIGURES[key]
+        if not rows and entry["statistics"][key]:
+            table.add_row(title, number(entry["statistics"][key]["median"], digits), "all alike")
+        for i, row in enumerate(rows[:WORST]):
+            value = number(row["value"], digits)
+            table.add_row("" if i else title, value, row["id"], row["part"])
+    return table
+
+
+def failures(name: str, rows: Sequence[Row]) -> Table:
+    """Why pairs of a batch were not drawn, the commonest reason first."""
+    table = _table(f"{name}: not drawn", "pairs", "first")
+    table.add_column("reason", overflow="fold")
+    for row in rows[:REASONS]:
+        table.add_row(str(row["count"]), row["first"], row["reason"])
+    if len(rows) > REASONS:
+        rest = sum(row["count"] for row in rows[REASONS:])
+        table.add_row(str(rest), "", f"{len(rows) - REASONS} more reasons")
     return table
 
 

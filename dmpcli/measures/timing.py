@@ -48,3 +48,15 @@ def punctuality(deadline: Floats, lateness: Floats, period: float) -> Punctualit
         int(np.maximum(due - 1.0, 0.0).sum()),
         len(lateness),
     )
+
+
+def spread(values: Floats) -> dict[str, float]:
+    """Return median, 99th percentile and maximum as a file's metadata hold them.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        At least one.
+    """
+    median, p99 = np.quantile(values, [0.50, 0.99])
+    return {"p50": float(median), "p99": float(p99), "max": float(np.max(values))}

@@ -5,9 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.primitives.generalization import Amplitude, Orientation, Pairs, curves, roll_out
+from dmpcli.primitives.generalization import (
+    Amplitude,
+    Orientation,
+    Pairs,
+    Trajectories,
+    curves,
+    roll_out,
+)
 from dmpcli.primitives.retiming import Timing, timing
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.plane import Plane, pair_charts
@@ -80,9 +87,83 @@ class Stroke:
         )
 
 
+@dataclass(frozen=True)
+class Block:
+    """Strokes of one duration, drawn together.
+
+    Attributes
+    ----------
+    rows : array of int, shape (B,)
+        Which of the pairs they belong to.
+    timing : Timing
+        T samples.
+    position : array, shape (B, T, 3)
+        mm.
+    euler : array, shape (B, T, 3), or None
+        Unwrapped X-Y-Z Euler angles, rad.
+    normal : array, shape (B, 1 or T, 3), or None
+        As in `Stroke`.
+    status : array of int, shape (B,)
+        `Status`.
+    outside : array of bool, shape (B, 1 or T)
+    unfolded : array of bool, shape (B,)
+    """
+
+    rows: Integers
+    timing: Timing
+    position: Floats
+    euler: Floats | None
+    normal: Floats | None
+    status: Integers
+    outside: Booleans
+    unfolded: Booleans
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def stroke(self, i: int) -> Stroke:
+        """Return the stroke of the i-th row."""
+        return Stroke(
+            self.timing,
+            self.position[i],
+            None if self.euler is None else self.euler[i],
+            None if self.normal is None else self.normal[i],
+            Status(self.status[i]),
+            self.outside[i],
+            bool(self.unfolded[i]),
+        )
+
+
 def draw(
     skill: Skill, pairs: Pairs, duration: Floats, surface: Surface | None, style: Style
 ) -> list[Stroke]:
+    """Draw a skill at every pair.
+
+    Parameters
+    ----------
+    skill, pairs, duration, surface, style
+        As in `draw_blocks`.
+
+    Returns
+    -------
+    list of Stroke
+        In the order of the pairs.
+
+    Raises
+    ------
+    InputError
+        The skill's own numbers overflow.
+    """
+    strokes: list[Stroke] = [None] * len(pairs)  # type: ignore[list-item]
+    for block in draw_blocks(skill, pairs, duration, surface, style):
+        for i, row in enumerate(block.rows):
+            strokes[row] = block.stroke(i)
+    return strokes
+
+
+def draw_blocks(
+    skill: Skill, pairs: Pairs, duration: Floats, surface: Surface | None, style: Style
+) -> Iterator[Block]:
     """Draw a skill at every pair; pairs of one duration are drawn together.
 
     Parameters
@@ -97,17 +178,16 @@ def draw(
         plane, parallel to the demonstration's.
     style : Style
 
-    Returns
-    -------
-    list of Stroke
-        In the order of the pairs.
+    Yields
+    ------
+    Block
+        By rising duration.
 
     Raises
     ------
     InputError
         The skill's own numbers overflow.
     """
-    strokes: list[Stroke] = [None] * len(pairs)  # type: ignore[list-item]
     for seconds in np.unique(duration):
         rows = np.flatnonzero(duration == seconds)
         when = timing(
@@ -118,34 +198,54 @@ def draw(
             style.ease_in,
             style.ease_out,
         )
-        for row, stroke in zip(rows, _drawn(skill, pairs[rows], when, surface, style), strict=True):
-            strokes[row] = stroke
-    return strokes
+        yield _drawn(skill, rows, pairs[rows], when, surface, style)
 
 
 def _drawn(
-    skill: Skill, pairs: Pairs, when: Timing, surface: Surface | None, style: Style
-) -> Iterator[Stroke]:
+    skill: Skill, rows: Integers, pairs: Pairs, when: Timing, surface: Surface | None, style: Style
+) -> Block:
     charts = None if skill.model == "original" else charts_of(skill, pairs, surface)
     shared = curves(skill, when.stroke)
     with np.errstate(over="ignore", invalid="ignore"):
         drawn = roll_out(skill, shared, pairs, charts, style.amplitude, style.orientation)
-    lift = drawn.lift
-    usable = slice(None) if lift is None else lift.status == Status.DRAWN
-    if not np.isfinite(drawn.position[usable]).all():
+    lift, count = drawn.lift, len(pairs)
+    if not _finite(drawn):
         raise InputError("the skill's numbers give no finite stroke; fit it again")
-    for i in range(len(pairs)):
-        euler = None if drawn.euler is None else drawn.euler[i]
-        if lift is not None:
-            normal: Floats | None = lift.normal[i]
-            status, outside = Status(lift.status[i]), lift.outside[i]
-            unfolded = bool(lift.unfolded[i])
-        else:
-            flat = surface is None or isinstance(surface, Plane)
-            plane_normal = surface.normal if isinstance(surface, Plane) else skill.frame.normal
-            normal = plane_normal[None] if flat else None
-            status, outside, unfolded = Status.DRAWN, np.zeros(1, dtype=bool), False
-        yield Stroke(when, drawn.position[i], euler, normal, status, outside, unfolded)
+    if lift is not None:
+        return Block(
+            rows,
+            when,
+            drawn.position,
+            drawn.euler,
+            lift.normal,
+            lift.status,
+            lift.outside,
+            lift.unfolded,
+        )
+    flat = surface is None or isinstance(surface, Plane)
+    normal = surface.normal if isinstance(surface, Plane) else skill.frame.normal
+    none = np.zeros(count, dtype=bool)
+    return Block(
+        rows,
+        when,
+        drawn.position,
+        drawn.euler,
+        np.broadcast_to(normal, (count, 1, 3)) if flat else None,
+        np.full(count, Status.DRAWN),
+        none[:, None],
+        none,
+    )
+
+
+def _finite(drawn: Trajectories) -> bool:
+    """Tell whether all positions are finite, but for those of strokes that cannot be drawn."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        # A sum of finite numbers of this size is finite: one pass, and no array of answers.
+        if np.isfinite(drawn.position.sum()):
+            return True
+    finite = np.isfinite(drawn.position).all(axis=(1, 2))
+    lift = drawn.lift
+    return bool((finite if lift is None else finite | (lift.status != Status.DRAWN)).all())
 
 
 def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None) -> Charts:

@@ -18,6 +18,8 @@ Orientation = Literal["keep", "surface"]
 
 # Rows of the matrix that every roll-out is a product with: a, b and the six forced responses.
 _START, _GOAL, _FORCED = 0, 1, 2
+# Samples whose tool orientations are worked out at once, so that they stay in the cache.
+_IN_CACHE = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ def roll_out(
     else:
         goal = charts.goals
         scale = _modified_scale(skill, goal, amplitude)
-        lift = _lift(charts, _coefficients(np.zeros_like(goal), goal, scale), shared)
+        lift = _lift(charts, goal, scale, shared)
         position = lift.position
         frames = skill.frame.axes[None, None]
         if orientation == "surface":
@@ -145,6 +147,64 @@ def roll_out(
         turn = _turn(skill, pairs, frames, turned=orientation == "surface" and lift is not None)
         euler = np.broadcast_to(_euler(turn, shared, scale), position.shape)
     return Trajectories(position, euler, lift)
+
+
+def poses(
+    skill: Skill,
+    shared: Floats,
+    pairs: Pairs,
+    charts: Charts | None,
+    amplitude: Amplitude = "keep",
+    orientation: Orientation = "keep",
+    out: Floats | None = None,
+) -> Floats:
+    """Draw a skill at new pairs into one array of poses; on a plane without a detour.
+
+    Parameters
+    ----------
+    skill, shared, pairs, charts, amplitude, orientation
+        As in `roll_out`.
+    out : array, shape (B, T, 6), optional
+        Where to write them; a new array without it.
+
+    Returns
+    -------
+    array, shape (B, T, 6)
+        x, y, z, mm, and unwrapped X-Y-Z Euler angles, rad; NaN for a skill without orientation.
+        Which strokes of a mesh could not be drawn, `roll_out` tells.
+    """
+    samples = shared.shape[1]
+    out = np.empty((len(pairs), samples, 6)) if out is None else out
+    if not isinstance(charts, PlaneCharts):
+        drawn = roll_out(skill, shared, pairs, charts, amplitude, orientation)
+        out[..., :3] = drawn.position
+        out[..., 3:] = np.nan if drawn.euler is None else drawn.euler
+        return out
+    goal = charts.goals
+    scale = _modified_scale(skill, goal, amplitude)
+    turn, angles = None, np.zeros((samples, 3))
+    if skill.oriented:
+        turned = orientation == "surface"
+        frames = charts.axes[:, None] if turned else skill.frame.axes[None, None]
+        turn = _turn(skill, pairs, frames, turned)
+        if turn.alike:
+            angles, turn = _euler(turn, shared, scale)[0], None
+    # Angles that all strokes share ride along in the product.
+    columns = np.concatenate([shared[:5].T, angles], axis=1)
+    factors = np.zeros((len(pairs), 8, 6))
+    factors[:, :5, :3] = _in_base(charts, goal, scale).swapaxes(1, 2)
+    factors[:, [5, 6, 7], [3, 4, 5]] = 1.0
+    if turn is None:
+        np.matmul(columns, factors, out=out)
+    else:
+        size = max(1, _IN_CACHE // samples)
+        for rows in (slice(first, first + size) for first in range(0, len(pairs), size)):
+            out[rows, :, :3] = columns[:, :5] @ factors[rows, :5, :3]
+            out[rows, :, 3:] = _euler(turn[rows], shared, scale[rows])
+    out[:, 0, :3] = charts.origin
+    if not skill.oriented:
+        out[..., 3:] = np.nan
+    return out
 
 
 def _coefficients(start: Floats, goal: Floats, scale: Floats) -> Floats:
@@ -158,18 +218,16 @@ def _coefficients(start: Floats, goal: Floats, scale: Floats) -> Floats:
 
 def _combined(coefficients: Floats, shared: Floats) -> Floats:
     """Linear combinations of the shared curves, shape (B, T, 3): one matrix product."""
-    flat = coefficients.reshape(-1, 5) @ shared[:5]
-    return flat.reshape(len(coefficients), 3, -1).transpose(0, 2, 1)
+    count = len(coefficients)
+    # Axis by axis in memory, so that a file's column is a view of it.
+    flat = coefficients.transpose(1, 0, 2).reshape(-1, 5) @ shared[:5]
+    return flat.reshape(3, count, -1).transpose(1, 2, 0)
 
 
-def _lift(charts: Charts, coefficients: Floats, shared: Floats) -> Lift:
+def _lift(charts: Charts, goal: Floats, scale: Floats, shared: Floats) -> Lift:
     if not isinstance(charts, PlaneCharts):
-        return charts.lift(_combined(coefficients, shared))
-    # An affine chart commutes with the linear roll-out: the product gives base positions at once.
-    coefficients = charts.axes @ coefficients
-    # a + b = 1 carries the origin.
-    coefficients[:, :, [_START, _GOAL]] += charts.origin[:, :, None]
-    position = _combined(coefficients, shared)
+        return charts.lift(_combined(_coefficients(np.zeros_like(goal), goal, scale), shared))
+    position = _combined(_in_base(charts, goal, scale), shared)
     # Rounding of a product must not leave the start beside the point that was asked for.
     position[:, 0] = charts.origin
     count = len(charts)
@@ -180,6 +238,14 @@ def _lift(charts: Charts, coefficients: Floats, shared: Floats) -> Lift:
         charts.status,
         np.zeros(count, dtype=bool),
     )
+
+
+def _in_base(charts: PlaneCharts, goal: Floats, scale: Floats) -> Floats:
+    """`_coefficients` of base positions: an affine chart commutes with the linear roll-out."""
+    coefficients = charts.axes @ _coefficients(np.zeros_like(goal), goal, scale)
+    # a + b = 1 carries the origin.
+    coefficients[:, :, [_START, _GOAL]] += charts.origin[:, :, None]
+    return coefficients
 
 
 def _modified_scale(skill: Skill, goal: Floats, amplitude: Amplitude) -> Floats:
@@ -213,30 +279,41 @@ class _Turn:
     ----------
     frames : array, shape (1 or B, 1 or T, 3, 3)
         C(t): E is in these axes.
-    first : array, shape (1 or B, 3, 3)
-        R(0).
+    begin : array, shape (1 or B, 3, 3)
+        C(0)ᵀ R(0).
     goal : array, shape (1 or B, 3)
         Angles of E at the goal, rad.
     """
 
     frames: Floats
-    first: Floats
+    begin: Floats
     goal: Floats
+
+    @property
+    def alike(self) -> bool:
+        """Whether one row serves all pairs."""
+        return len(self.frames) == len(self.begin) == len(self.goal) == 1
+
+    def __getitem__(self, rows: slice) -> "_Turn":
+        parts = (self.frames, self.begin, self.goal)
+        return _Turn(*(part if len(part) == 1 else part[rows] for part in parts))
 
 
 def _turn(skill: Skill, pairs: Pairs, frames: Floats, turned: bool = False) -> _Turn:
     """Turn of the tool in `frames`; `turned`: R(0) stands to them as R_demo(0) to C_d."""
     R = skill.frame.rotation
     assert R is not None
-    begin, end = frames[:, 0], frames[:, -1]
-    first = begin @ skill.frame.axes.T @ R if turned else R[None]
     if pairs.start_rotation is not None:
-        first = pairs.start_rotation
+        begin = np.swapaxes(frames[:, 0], -1, -2) @ pairs.start_rotation
+    elif turned:
+        begin = (skill.frame.axes.T @ R)[None]
+    else:
+        begin = np.swapaxes(frames[:, 0], -1, -2) @ R
     goal = skill.goal[None, 3:]
     if pairs.goal_rotation is not None:
-        E = np.swapaxes(end, -1, -2) @ pairs.goal_rotation @ np.swapaxes(first, -1, -2) @ begin
-        goal = rotations.to_euler(E)
-    return _Turn(frames, first, goal)
+        end = np.swapaxes(frames[:, -1], -1, -2) @ pairs.goal_rotation
+        goal = rotations.to_euler(end @ np.swapaxes(begin, -1, -2))
+    return _Turn(frames, begin, goal)
 
 
 def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
@@ -250,5 +327,7 @@ def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
         scale = scale[:1]
     angles = turn.goal[:, None] * shared[_GOAL][:, None] + scale[:, None, 3:] * shared[5:].T
     E = rotations.from_euler(angles)
-    begin = np.swapaxes(turn.frames[:, :1], -1, -2) @ turn.first[:, None]
-    return rotations.to_euler_continuous(turn.frames @ E @ begin)
+    E = E @ turn.begin[:, None]
+    if len(E) == 1 and turn.frames.shape[1] == 1:
+        return rotations.euler_of_products(turn.frames[:, 0], E[0])
+    return rotations.to_euler_continuous(turn.frames @ E)

@@ -1,137 +1,402 @@
-"""Dataset folders: many strokes as parts in pair order, and a table with a status per pair."""
+"""A batch read part by part: its table of pairs, and the trajectories of one part at a time."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
-from dmpcli.arrays import Floats, Integers
-from dmpcli.errors import RefusedError
-from dmpcli.primitives.drawing import Stroke, Style, draw
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.skill import Skill
-from dmpcli.records import record, streams, trajectory
-from dmpcli.records.pairs import OK, PairTable
+from dmpcli.arrays import AnyArray, Floats, Integers
+from dmpcli.errors import InputError
+from dmpcli.records import manifest, record, schemas, streams
+from dmpcli.records.columns import columns_of
+from dmpcli.records.pairs import GOAL, OK, START
 from dmpcli.records.record import Provenance
-from dmpcli.surfaces.protocol import Status, Surface
+from dmpcli.records.schemas import NORMAL, Column, Schema
+from dmpcli.records.streams import Source
 
-PAIRS_PER_PART = 2000
+AGAIN = "the command that draws it goes on from the parts that are there"
 
 
 @dataclass(frozen=True)
-class Task:
-    """What to draw, where and how.
+class Batch:
+    """What the table of a batch says of its pairs: some numbers each.
 
     Attributes
     ----------
-    skill : Skill
-    surface : Surface or None
-    style : Style
-    on_border : {'fail', 'clip', 'skip'}
-        What becomes of a stroke that leaves the surface.
+    folder : Path
+    sha256 : str
+        Of the table.
+    provenance : Provenance
+    ids : Arrow array of text, length B
+        Of the pairs that have a trajectory, in the order of the table.
+    part : array of int, shape (B,)
+        Their parts, by place in `files`.
+    start, goal : array, shape (B, 3), or None
+        mm.
+    normal : array, shape (B, 3), or None
+        NaN where it is not known.
+    files : list of str
+        Names of the parts.
+    status : Arrow array of text
+        Of all pairs.
+    others : Arrow array of text
+        Ids of all pairs.
     """
 
-    skill: Skill
-    surface: Surface | None
-    style: Style
-    on_border: str
+    folder: Path
+    sha256: str
+    provenance: Provenance
+    ids: Any
+    part: Integers
+    start: Floats | None
+    goal: Floats | None
+    normal: Floats | None
+    files: list[str]
+    status: Any
+    others: Any
+
+    def __len__(self) -> int:
+        return len(self.part)
+
+    def rows_of(self, part: int) -> Integers:
+        """Rows of the pairs that lie in a part, counted among those that have a trajectory."""
+        return np.flatnonzero(self.part == part)
 
 
-def settled(task: Task, stroke: Stroke) -> tuple[Stroke, str]:
-    """Return a stroke as it is to be written, and ``ok`` or why it cannot be drawn."""
-    if stroke.status == Status.DRAWN:
-        return stroke, OK
-    if stroke.status == Status.BORDER and task.on_border == "clip":
-        return stroke.until_border(), OK
-    return stroke, stroke.status.reason
+@dataclass(frozen=True)
+class Piece:
+    """Whole trajectories of a part, one after the other.
 
-
-def write(
-    folder: Path,
-    task: Task,
-    table: PairTable,
-    pairs: Pairs,
-    duration: Floats,
-    provenance: Provenance,
-    stop: bool,
-    advance: Callable[[int], None],
-) -> int:
-    """Draw the good pairs of a table part by part, and last the table itself.
-
-    Parameters
+    Attributes
     ----------
-    folder : Path
-    task : Task
-    table : PairTable
-        Pairs that cannot be drawn get their status here.
-    pairs : Pairs
-        Those of the table, on the surface.
-    duration : array, shape (B,)
-        Of each stroke without easing, s.
-    provenance : Provenance
-    stop : bool
-        Whether the first pair that cannot be drawn ends the run, with nothing written.
-    advance : callable
-        Told how many pairs are done.
+    name : str
+        What messages call the part.
+    facts : dict
+        Of the part.
+    rows : array of int, shape (k,)
+        Of the batch.
+    first : array of int, shape (k + 1,)
+        Where each trajectory begins among the columns' rows, and where the last one ends.
+    columns : dict of array
+    """
+
+    name: str
+    facts: dict[str, Any]
+    rows: Integers
+    first: Integers
+    columns: dict[str, AnyArray]
+
+    def has(self, *names: str) -> bool:
+        """Tell whether all of these columns are there and hold at least one value."""
+        return all(name in self._filled for name in names)
+
+    @cached_property
+    def _filled(self) -> set[str]:
+        return {name for name, column in self.columns.items() if not np.isnan(column).all()}
+
+
+def read(folder: Path) -> tuple[Batch, list[str]]:
+    """Read the table of a finished batch, and check what its parts say of themselves.
 
     Returns
     -------
-    int
-        How many of the strokes cross a sharp crease.
+    Batch
+    list of str
+        What is odd about the folder, though all trajectories are there.
 
     Raises
     ------
-    RefusedError
-        A pair cannot be drawn, and `stop` was asked for.
+    InputError
+        The batch is not finished; a part is missing, damaged, or of another batch; by name.
     """
-    good = np.flatnonzero(table.good)
-    normal = np.full((len(table), 3), np.nan)
-    lasting = duration.copy()
-    part_of = [""] * len(table)
-    unfolded = 0
-    provenance = replace(
-        provenance, facts=trajectory.facts_of(task.skill) | {"rate": task.style.rate}
+    source = streams.read_table(folder)
+    batch = _table(folder, source)
+    odd = _compared(batch)
+    for file in batch.files:
+        _footer(batch, file)
+    return batch, odd
+
+
+def _table(folder: Path, source: Source) -> Batch:
+    table = record.parquet_table(source)
+    provenance = _provenance(table.schema.metadata, schemas.PAIRS, source.name)
+    named = schemas.PAIRS.columns
+    numbers = (*START, *GOAL, *NORMAL)
+    columns = columns_of(table, {n: named[n] for n in numbers}, source.name)
+    ids, status = (_text(table, name, named[name], source.name) for name in ("id", "status"))
+    part = np.full(len(ids), -1)
+    files: list[str] = []
+    if "part" in table.column_names:
+        words = _text(table, "part", named["part"], source.name).dictionary_encode()
+        names = [name or "" for name in words.dictionary.to_pylist()]
+        files = [name for name in names if name]
+        place = {name: i for i, name in enumerate(files)}
+        # Code -1, no value, takes the last one.
+        part = np.array([*(place.get(name, -1) for name in names), -1])[
+            np.asarray(words.indices.fill_null(-1))
+        ]
+    drawn = np.flatnonzero(part >= 0)
+    bad = next((f for f in files if Path(f).name != f), None)
+    if bad is not None:
+        raise InputError(f"{source.name}: column 'part' names {bad!r}, which is no file of its own")
+
+    def stacked(names: Sequence[str]) -> Floats | None:
+        if not all(name in columns for name in names):
+            return None
+        return np.column_stack([columns[name][drawn] for name in names])
+
+    return Batch(
+        folder,
+        source.sha256,
+        provenance,
+        ids.take(pa.array(drawn)),
+        part[drawn],
+        stacked(START),
+        stacked(GOAL),
+        stacked(NORMAL),
+        files,
+        status,
+        ids,
     )
-    with streams.dataset(folder) as place:
-        for number, first in enumerate(range(0, len(good), PAIRS_PER_PART)):
-            rows = good[first : first + PAIRS_PER_PART]
-            strokes = draw(task.skill, pairs[rows], duration[rows], task.surface, task.style)
-            kept = _keep(task, table, rows, strokes, stop)
-            name = f"part-{number:05d}.parquet"
-            for row, stroke in kept:
-                lasting[row] = stroke.timing.t[-1]
-                part_of[row] = name
-                unfolded += stroke.unfolded
-                if stroke.normal is not None and len(stroke.normal) == 1:
-                    normal[row] = stroke.normal[0]
-            if kept:
-                done = trajectory.trajectory_record(
-                    [table.ids[row] for row, _ in kept], [stroke for _, stroke in kept], provenance
-                )
-                streams.write(place / name, record.encode(done))
-            advance(len(rows))
-        done = trajectory.pairs_record(
-            table.ids, pairs, lasting, normal, part_of, table.status, provenance
+
+
+def _text(table: Any, name: str, column: Column, file: str) -> Any:
+    """Return a text column as one Arrow array."""
+    if name not in table.column_names:
+        raise InputError(
+            f"{file}: column {name!r} is missing; it has {', '.join(table.column_names)}"
         )
-        streams.write(place / streams.TABLE, record.encode(done))
-    return unfolded
+    try:
+        values = table.column(name).cast(pa.string()).combine_chunks()
+    except pa.ArrowException:
+        kind = table.column(name).type
+        raise InputError(f"{file}: column {name!r} holds {kind}, text is needed") from None
+    if column.required and values.null_count:
+        raise InputError(f"{file}: column {name!r} has rows without a value; draw the batch again")
+    return values
 
 
-def _keep(
-    task: Task, table: PairTable, rows: Integers, strokes: list[Stroke], stop: bool
-) -> list[tuple[int, Stroke]]:
-    """Rows and strokes that can be drawn; the others get their status."""
-    kept = []
-    for row, drawn in zip(rows, strokes, strict=True):
-        stroke, status = settled(task, drawn)
-        if status == OK:
-            kept.append((int(row), stroke))
-            continue
-        table.status[row] = f"{table.places[row]}, pair {table.ids[row]}: {status}"
-        skipped = task.on_border == "skip" and stroke.status == Status.BORDER
-        if stop and not skipped:
-            raise RefusedError(
-                f"{table.name}: {table.status[row]}; move the pair, or give --on-error skip"
+def _provenance(metadata: Any, expected: Schema, name: str) -> Provenance:
+    """Provenance of a file of one schema, from its metadata."""
+    header = record.header_of(_Bare(metadata), name)
+    if header.get("schema") != expected.name:
+        raise InputError(
+            f"{name}: is a {header.get('schema')} file, a {expected.name} file is needed here"
+        )
+    if header["version"] > expected.version:
+        raise InputError(
+            f"{name}: {expected.name} version {header['version']} is newer than this program's "
+            f"({expected.version}); upgrade dmpcli"
+        )
+    return Provenance(
+        str(header.get("command", "")),
+        dict(header.get("options", {})),
+        tuple(header.get("inputs", ())),
+        dict(header.get("facts", {})),
+        str(header.get("tool", "")),
+    )
+
+
+class _Bare:
+    """Metadata where `header_of` looks for them."""
+
+    def __init__(self, metadata: Any) -> None:
+        self.schema, self.metadata = self, metadata
+
+
+def _compared(batch: Batch) -> list[str]:
+    """Compare the table with the manifest; what is odd."""
+    path = batch.folder / streams.MANIFEST
+    if not path.is_file():
+        return [
+            f"{batch.folder}: {streams.MANIFEST} is missing, so the batch may not be finished; "
+            f"{AGAIN}"
+        ]
+    found = manifest.decode(streams.read(path))
+    inputs = [entry.model_dump() for entry in found.inputs]
+    if inputs != list(batch.provenance.inputs) or found.options != batch.provenance.options:
+        raise InputError(
+            f"{path}: was written for other inputs or options than {streams.TABLE}; "
+            "draw the batch again"
+        )
+    listed = {entry.file for entry in found.parts}
+    unlisted = next((file for file in batch.files if file not in listed), None)
+    if unlisted is not None:
+        raise InputError(
+            f"{batch.folder / unlisted}: does not belong to {streams.MANIFEST}; "
+            "draw the batch again"
+        )
+    lost = sorted(listed - set(batch.files))
+    if lost:
+        raise InputError(
+            f"{path}: lists {lost[0]}, of which {streams.TABLE} knows nothing; draw the batch again"
+        )
+    for entry in found.parts:
+        part = batch.folder / entry.file
+        size = part.stat().st_size if part.is_file() else None
+        if size is not None and size != entry.bytes:
+            raise InputError(
+                f"{part}: has {size} bytes, {streams.MANIFEST} says {entry.bytes}: it is damaged "
+                "or of another batch; draw the batch again"
             )
-    return kept
+    there = {file.name for file in batch.folder.glob(streams.PART)}
+    more = sorted(there - listed)
+    if not more:
+        return []
+    others = f" and {len(more) - 1} more" if len(more) > 1 else ""
+    return [
+        f"{batch.folder}: {more[0]}{others} is not in {streams.MANIFEST} and left out of the report"
+    ]
+
+
+def _footer(batch: Batch, file: str) -> tuple[pq.ParquetFile, Provenance]:
+    """Open a part and check that it belongs to the batch."""
+    path = batch.folder / file
+    if not path.is_file():
+        raise InputError(f"{path}: is missing, {streams.TABLE} names it; {AGAIN}")
+    try:
+        part = pq.ParquetFile(path, read_dictionary=["id"])
+    except (pa.ArrowException, OSError, ValueError):
+        raise InputError(
+            f"{path}: is not a Parquet file, or it is truncated or damaged; draw the batch again"
+        ) from None
+    found = _provenance(part.schema_arrow.metadata, schemas.TRAJECTORY, str(path))
+    ours = batch.provenance
+    if (found.options, found.inputs) != (ours.options, ours.inputs):
+        raise InputError(
+            f"{path}: was drawn from other inputs or options than {streams.TABLE}; "
+            "draw the batch again"
+        )
+    return part, found
+
+
+def pieces(
+    batch: Batch, columns: Sequence[str], parts: Sequence[int] | None = None
+) -> Iterator[Piece]:
+    """Yield the trajectories of a batch, one part or less at a time.
+
+    Parameters
+    ----------
+    batch : Batch
+    columns : sequence of str
+        Beside ``t x y z``, as far as a part has them.
+    parts : sequence of int, optional
+        Only these, by place in `Batch.files`.
+
+    Raises
+    ------
+    InputError
+        A part is damaged, or does not hold the pairs that the table says.
+    """
+    for number in range(len(batch.files)) if parts is None else parts:
+        rows = batch.rows_of(number)
+        done = 0
+        for piece in _part(batch, batch.files[number], rows, columns):
+            done += len(piece.rows)
+            yield piece
+        if done < len(rows):
+            lost = batch.ids[int(rows[done])].as_py()
+            raise InputError(
+                f"{batch.folder / batch.files[number]}: lacks pair {lost!r}, which {streams.TABLE} "
+                "says it holds; draw the batch again"
+            )
+
+
+def _part(batch: Batch, file: str, rows: Integers, columns: Sequence[str]) -> Iterator[Piece]:
+    """Whole trajectories of one part; one that goes on in the next row group waits for it."""
+    part, provenance = _footer(batch, file)
+    name = str(batch.folder / file)
+    known = part.schema_arrow.names
+    if "id" not in known:
+        raise InputError(f"{name}: column 'id' is missing; it has {', '.join(known)}")
+    named = schemas.TRAJECTORY.columns
+    wanted = {n: named[n] for n in ("t", "x", "y", "z", *columns)}
+    chosen = ["id", *(n for n in wanted if n in known)]
+    expected = batch.ids.take(pa.array(rows))
+    done, groups = 0, part.metadata.num_row_groups
+    carried: dict[str, AnyArray] = {}
+    waiting: str | None = None
+    for group in range(groups):
+        try:
+            table = part.read_row_group(group, columns=chosen)
+        except (pa.ArrowException, OSError, ValueError):
+            raise InputError(f"{name}: is damaged inside; draw the batch again") from None
+        ids, first = _runs(table.column("id"), name)
+        found = columns_of(table, wanted, name)
+        if waiting is not None:
+            before = len(next(iter(carried.values())))
+            found = {n: np.concatenate([carried[n], c]) for n, c in found.items()}
+            again = ids[0] == waiting
+            ids = ids if again else [waiting, *ids]
+            first = np.concatenate([[0], (first + before)[1 if again else 0 :]])
+            waiting = None
+        if group < groups - 1:
+            waiting, last = ids[-1], int(first[-2])
+            carried = {n: c[last:] for n, c in found.items()}
+            ids, first = ids[:-1], first[:-1]
+        _same(name, ids, expected, done)
+        if len(ids):
+            yield Piece(name, provenance.facts, rows[done : done + len(ids)], first, found)
+        done += len(ids)
+
+
+def _runs(column: Any, name: str) -> tuple[list[str], Integers]:
+    """Ids in turn, and where each one begins, with the end."""
+    if column.null_count:
+        raise InputError(f"{name}: column 'id' has rows without a value; draw the batch again")
+    words = (
+        column.unify_dictionaries().combine_chunks() if column.num_chunks > 1 else column.chunk(0)
+    )
+    if not pa.types.is_dictionary(words.type):
+        words = words.dictionary_encode()
+    code = np.asarray(words.indices)
+    first = np.concatenate([[0], np.flatnonzero(code[1:] != code[:-1]) + 1, [len(code)]])
+    ids = words.dictionary.take(pa.array(code[first[:-1]])).cast(pa.string()).to_pylist()
+    return ids, first.astype(np.int64)
+
+
+def _same(name: str, ids: list[str], expected: Any, done: int) -> None:
+    """Check that these are the next pairs that the part should hold."""
+    meant = expected.slice(done, len(ids)).to_pylist()
+    if ids == meant:
+        return
+    i = next((i for i, (a, b) in enumerate(zip(ids, meant, strict=False)) if a != b), len(meant))
+    where = f"where {streams.TABLE} says {meant[i]!r}" if i < len(meant) else "as one too many"
+    raise InputError(f"{name}: holds pair {ids[i]!r} {where}; draw the batch again")
+
+
+def states_of(batch: Batch) -> tuple[dict[str, int], list[dict[str, Any]]]:
+    """Count the pairs by status, the reasons without the place of each row.
+
+    Returns
+    -------
+    dict of int
+        Pairs per reason; `OK` for those with a trajectory.
+    list of dict
+        For each other reason ``reason``, ``count`` and the id of the ``first``; the commonest
+        first.
+    """
+    status = batch.status
+    place = r"^(?:line|row) [0-9]+(?:, pair .*?: |, |: )"
+    reason = pc.replace_substring_regex(status, place, "")
+    # A cell as it stands in the table is each row's own.
+    reason = pc.replace_substring_regex(reason, r"^(column '[^']*'): .* (is )", r"\1 \2")
+    reason = pc.replace_substring_regex(reason, r" lies [0-9.]+ mm off", " lies off")
+    words = reason.dictionary_encode()
+    code = np.asarray(words.indices)
+    names = words.dictionary.to_pylist()
+    counts = np.bincount(code, minlength=len(names))
+    states = {name: int(n) for name, n in zip(names, counts, strict=True)}
+    _, first = np.unique(code, return_index=True)
+    failures = [
+        {"reason": name, "count": int(n), "first": batch.others[int(row)].as_py()}
+        for name, n, row in zip(names, counts, first, strict=True)
+        if name != OK
+    ]
+    return states, sorted(failures, key=lambda entry: -int(entry["count"]))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli import rotations
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.records import tables
@@ -36,8 +36,8 @@ class PairTable:
         Of the ``id`` column, else the row numbers from 1.
     pairs : Pairs
         B pairs; rows whose status is not ``ok`` hold NaN or what they held.
-    places : list of str
-        Where each row stands in the file, as a person counts.
+    lines : array of int, shape (B,), optional
+        Where each row stands in a text file; without it rows are counted from 1.
     duration : array, shape (B,)
         s; NaN where the table does not say.
     status : array of str, shape (B,)
@@ -47,12 +47,16 @@ class PairTable:
     name: str
     ids: list[str]
     pairs: Pairs
-    places: list[str]
+    lines: Integers | None
     duration: Floats
     status: list[str]
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def place(self, row: int) -> str:
+        """Return how a person finds row `row`, counted from 0."""
+        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     @property
     def good(self) -> Booleans:
@@ -88,7 +92,7 @@ def read(source: Source) -> PairTable:
             _rotations(table, START_ANGLES, status),
             _rotations(table, GOAL_ANGLES, status),
         ),
-        [table.at(row) for row in range(len(table))],
+        table.lines,
         duration,
         status,
     )
@@ -130,7 +134,9 @@ def _rotations(table: Table, names: tuple[str, ...], status: list[str]) -> Float
 def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
         return [str(row + 1) for row in range(len(table))]
-    ids = [str(value) for value in table.columns["id"]]
+    ids = table.texts("id")
+    if len(set(ids)) == len(ids):
+        return ids
     seen: dict[str, int] = {}
     for row, name in enumerate(ids):
         if name in seen:

@@ -4,9 +4,15 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from dmpcli.records import plane, pose, skill, tool
+from dmpcli.records import manifest, plane, pose, skill, tool
 
-SCHEMAS = {"skill": skill.schema, "plane": plane.schema, "tool": tool.schema, "pose": pose.schema}
+SCHEMAS = {
+    "skill": skill.schema,
+    "plane": plane.schema,
+    "tool": tool.schema,
+    "pose": pose.schema,
+    "manifest": manifest.schema,
+}
 
 
 def folder() -> Path:

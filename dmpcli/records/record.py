@@ -1,7 +1,7 @@
 """A record: one Parquet file between the stages, its columns as arrays and its provenance."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,11 @@ from dmpcli import __version__, rotations
 from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
-from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Column, Schema
+from dmpcli.records.columns import TYPES, columns_of
+from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
 from dmpcli.records.streams import PART, TABLE, Source
 
-_KEY = b"dmpcli"
-_TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
+KEY = b"dmpcli"
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class Record:
     ----------
     schema : Schema
     columns : dict of array, shape (rows,)
-        Missing optional columns are absent; nulls in a number column are NaN.
+        Missing optional columns are absent; nulls in a number column are NaN. A text column that is
+        to be written may be an Arrow array.
     provenance : Provenance
     name : str
         What messages call the file.
@@ -101,49 +102,114 @@ def _all_null(column: AnyArray) -> bool:
     return bool(column.dtype.kind == "f" and np.all(np.isnan(column)))
 
 
-def encode(record: Record) -> bytes:
+@dataclass(frozen=True)
+class Form:
+    """How the numbers of a file are stored.
+
+    Attributes
+    ----------
+    single : bool
+        Lengths, angles and forces in single precision: at 1 m a step of 6e-5 mm. Times stay double.
+    compression : {'zstd', 'lz4', 'snappy', 'none'}
+    """
+
+    single: bool = False
+    compression: str = "zstd"
+
+
+def encode(record: Record, form: Form | None = None) -> bytes:
     """Return the record as the bytes of a Parquet file; the same record gives the same bytes."""
+    sink = pa.BufferOutputStream()
+    store(record, sink, form)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def store(record: Record, sink: Any, form: Form | None = None) -> None:
+    """Write the record as a Parquet file into a path or an open Arrow or Python file.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    form = form or Form()
     fields, arrays = [], []
     for name, column in record.schema.columns.items():
         if name not in record.columns:
             if column.required:
                 raise KeyError(f"{record.schema.name} lacks column {name}")
             continue
-        arrays.append(_arrow(record.columns[name], _TYPES[column.type]))
+        single = form.single and column.type == "double" and column.unit != "s"
+        kind = pa.float32() if single else TYPES[column.type]
+        arrays.append(_arrow(record.columns[name], kind))
         fields.append(
-            pa.field(
-                name,
-                _TYPES[column.type],
-                metadata={"unit": column.unit, "meaning": column.meaning},
-            )
+            pa.field(name, kind, metadata={"unit": column.unit, "meaning": column.meaning})
         )
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={_KEY: _header(record)}))
-    floats = [f.name for f in fields if f.type == pa.float64()]
-    others = [f.name for f in fields if f.type != pa.float64()]
-    sink = pa.BufferOutputStream()
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={KEY: header(record)}))
+    floats = [f.name for f in fields if pa.types.is_floating(f.type)]
+    others = [f.name for f in fields if not pa.types.is_floating(f.type)]
     pq.write_table(
-        table, sink, compression="zstd", use_byte_stream_split=floats, use_dictionary=others
+        table,
+        sink,
+        compression=form.compression,
+        use_byte_stream_split=floats,
+        use_dictionary=others,
     )
-    return bytes(sink.getvalue().to_pybytes())
 
 
-def _arrow(values: AnyArray, kind: Any) -> Any:
-    """One column for pyarrow; NaN becomes null."""
+def repeated(texts: Sequence[str], counts: int | Sequence[int]) -> Any:
+    """Return a text column that holds each text so many times in a row, as an Arrow array.
+
+    Raises
+    ------
+    InputError
+        More text than a column can hold, 2 GiB.
+    """
+    words = [text.encode() for text in texts]
+    each = [counts] * len(words) if isinstance(counts, int) else list(counts)
+    content = b"".join([word * count for word, count in zip(words, each, strict=True)])
+    if len(content) >= 1 << 31:
+        raise InputError("more text than one file can hold; give fewer --pairs-per-part")
+    sizes = np.repeat(np.array([len(word) for word in words], dtype=np.int32), each)
+    ends = np.zeros(len(sizes) + 1, dtype=np.int32)
+    np.cumsum(sizes, out=ends[1:])
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(content)]
+    return pa.Array.from_buffers(pa.string(), len(sizes), buffers)
+
+
+def _arrow(values: Any, kind: Any) -> Any:
+    """One column for pyarrow; NaN and None become null."""
+    if isinstance(values, pa.Array):
+        return values
     # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
     if kind == pa.string():
-        texts = [str(value).encode() for value in values]
+        texts = [b"" if value is None else str(value).encode() for value in values]
         ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
-        buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
+        known = np.array([value is not None for value in values], dtype=bool)
+        buffers = [_validity(known), pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
         return pa.Array.from_buffers(kind, len(texts), buffers)
-    known = ~np.isnan(values) if values.dtype.kind == "f" else np.ones(len(values), dtype=bool)
-    nulls = None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little"))
+    valid = None
+    if values.dtype.kind == "f" and _may_hold_nan(values):
+        valid = _validity(~np.isnan(values))
     data = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
-    return pa.Array.from_buffers(kind, len(data), [nulls, pa.py_buffer(data)])
+    return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)])
 
 
-def _header(record: Record) -> bytes:
+def _may_hold_nan(values: Floats) -> bool:
+    # A sum is NaN where one of its terms is: this tells without an array of answers.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isnan(values.sum()))
+
+
+def _validity(known: Booleans) -> Any:
+    """Return Arrow's bitmap of the values that are there; None where all are."""
+    return None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little"))
+
+
+def header(record: Record) -> bytes:
+    """Return the metadata of a record as they stand in its file."""
     p = record.provenance
-    header = {
+    entries = {
         "schema": record.schema.name,
         "version": record.schema.version,
         "tool": p.tool,
@@ -154,7 +220,7 @@ def _header(record: Record) -> bytes:
         "frame": schemas.FRAME,
         "euler": schemas.EULER,
     }
-    return json.dumps(header, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+    return json.dumps(entries, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
 def decode(source: Source, expected: Schema | None = None) -> Record:
@@ -223,18 +289,18 @@ def is_ours(source: Source) -> bool:
         metadata = pq.read_schema(source.open()).metadata or {}
     except (pa.ArrowException, OSError, ValueError):
         return True
-    return _KEY in metadata
+    return KEY in metadata
 
 
 def header_of(table: Any, name: str) -> dict[str, Any]:
     """Return our metadata of a pyarrow table; InputError where there is none or it is broken."""
     metadata = table.schema.metadata or {}
-    if _KEY not in metadata:
+    if KEY not in metadata:
         raise InputError(
             f"{name}: a Parquet file, but not written by dmpcli; fit can read it, see fit --help"
         )
     try:
-        header = json.loads(metadata[_KEY])
+        header = json.loads(metadata[KEY])
     except ValueError:
         header = None
     if not isinstance(header, dict) or not _sound(header):
@@ -254,7 +320,14 @@ def _sound(header: dict[str, Any]) -> bool:
         and _sound_facts(facts)
         and isinstance(facts.get("trajectory", {}), dict)
         and _sound_facts(facts.get("trajectory", {}))
+        and all(isinstance(facts.get(key, []), list) for key in ("strokes", "drawn", "remaining"))
+        and all(_sound_stroke(stroke) for stroke in facts.get("strokes", []))
+        and ("drawn" in facts) == ("remaining" in facts)
     )
+
+
+def _sound_stroke(said: object) -> bool:
+    return isinstance(said, dict) and isinstance(said.get("id"), str) and _sound_facts(said)
 
 
 def _sound_facts(facts: dict[str, Any]) -> bool:
@@ -273,86 +346,17 @@ def _is_number(value: object) -> bool:
 
 
 def foreign_parts(folder: Path) -> list[str]:
-    """Names of files in a dataset folder that stand where ours would, but are not ours."""
+    """Names of files in a dataset folder that stand where ours would, but are not ours.
+
+    A damaged Parquet file, or an empty one, counts as ours: a power cut can leave such parts.
+    """
     foreign = []
     for file in sorted([*folder.glob(PART), *folder.glob(TABLE)]):
         try:
-            ours = _KEY in (pq.read_schema(file).metadata or {})
+            ours = KEY in (pq.read_schema(file).metadata or {})
         except (pa.ArrowException, OSError, ValueError):
-            ours = False
+            with file.open("rb") as stream:
+                ours = stream.read(4) in (b"", b"PAR1")
         if not ours:
             foreign.append(file.name)
     return foreign
-
-
-def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:
-    """Return the wanted columns of a pyarrow table as arrays, checked.
-
-    Raises
-    ------
-    InputError
-        A required column is missing, empty or null somewhere, or a value is not a finite number.
-    """
-    columns: dict[str, AnyArray] = {}
-    for key, column in wanted.items():
-        if key not in table.column_names:
-            if column.required:
-                raise InputError(
-                    f"{name}: column {key!r} is missing; it has {', '.join(table.column_names)}"
-                )
-            continue
-        columns[key] = _array(table.column(key), key, column, name)
-    if table.num_rows == 0:
-        raise InputError(f"{name}: holds no rows")
-    return columns
-
-
-def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
-    try:
-        values = chunked.cast(_TYPES[column.type]).combine_chunks()
-    except pa.ArrowException:
-        raise InputError(
-            f"{name}: column {key!r} holds {chunked.type}, numbers are needed"
-            if column.type != "string"
-            else f"{name}: column {key!r} holds {chunked.type}, text is needed"
-        ) from None
-    nulls = _nulls(values)
-    if column.required and nulls.any():
-        raise InputError(
-            f"{name}: column {key!r}, row {int(np.argmax(nulls)) + 1}: no value; "
-            "remove the row or fill it in"
-        )
-    if column.type == "string":
-        return np.asarray(values.to_pylist(), dtype=object)
-    array = _numbers(values)
-    if column.type == "int64":
-        array[nulls] = -1
-        return array
-    array[nulls] = np.nan
-    bad = ~np.isfinite(array) & ~nulls
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InputError(
-            f"{name}: column {key!r}, row {row + 1}: {array[row]} is not a finite number; "
-            "remove the row or mend it"
-        )
-    return array
-
-
-def _nulls(values: Any) -> Booleans:
-    """Tell which values of a pyarrow array are null, shape (rows,)."""
-    if values.null_count == 0:
-        return np.zeros(len(values), dtype=bool)
-    bits = np.frombuffer(values.buffers()[0], dtype=np.uint8)
-    known = np.unpackbits(bits, bitorder="little")[values.offset : values.offset + len(values)]
-    nulls: Booleans = known == 0
-    return nulls
-
-
-def _numbers(values: Any) -> AnyArray:
-    """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
-    dtype = values.type.to_pandas_dtype()
-    if len(values) == 0:
-        return np.empty(0, dtype=dtype)
-    whole = np.frombuffer(values.buffers()[1], dtype=dtype)
-    return whole[values.offset : values.offset + len(values)].copy()

@@ -103,7 +103,8 @@ RUN = Schema(
     | {
         "coupling": Column("mm", "e of eq. (10), along the normal", required=False),
         "state": Column("1", "robot state", "string"),
-        "phase": Column("1", "approach, stroke or stop", "string"),
+        "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
+        "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),
     },
 )
 
@@ -132,4 +133,20 @@ PAIRS = Schema(
     },
 )
 
-SCHEMAS = {s.name: s for s in (DEMONSTRATION, TRAJECTORY, RUN, PAIRS)}
+POSES = Schema(
+    "poses",
+    1,
+    "static poses for the calibration, one row per pose, as the dwell there had it in the mean",
+    {"t": Column("s", "when the dwell ended, since the calibration began")}
+    | _pose("actual TCP")
+    | _wrench("mean wrench as sensed, sensor axes", "raw")
+    | _wrench("standard deviation of one reading", "std")
+    | {
+        "samples": Column("1", "readings in the mean", "int64"),
+        "moved": Column("mm", "how far the TCP moved meanwhile", required=False),
+        "turned": Column("rad", "how far the tool turned meanwhile", required=False),
+        "unsteady": Column("N", "change of the force between the dwell's halves", required=False),
+    },
+)
+
+SCHEMAS = {s.name: s for s in (DEMONSTRATION, TRAJECTORY, RUN, PAIRS, POSES)}

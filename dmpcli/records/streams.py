@@ -7,15 +7,18 @@ import contextlib
 import hashlib
 import io
 import os
-import shutil
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from dmpcli.errors import InputError
 
 DASH = "-"
+
+JOURNAL = ".journal"
+"""Suffix of the journal of a run that has not come to its end."""
+
+_ARROW_STREAM = b"\xff\xff\xff\xff"
 
 
 @dataclass(frozen=True)
@@ -35,13 +38,19 @@ class Source:
         return io.BytesIO(self.content)
 
 
-def read(path: str | Path) -> Source:
+def read(path: str | Path, journal: bool = False) -> Source:
     """Read one input whole; ``-`` is standard input.
+
+    Parameters
+    ----------
+    path : str or Path
+    journal : bool
+        Whether it may be a journal, which only `recover` reads.
 
     Raises
     ------
     InputError
-        The file is missing, a directory, empty or not readable.
+        The file is missing, a directory, empty or not readable; or it is a journal.
     """
     if str(path) == DASH:
         if sys.stdin is None:
@@ -59,6 +68,11 @@ def read(path: str | Path) -> Source:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     if not source.content:
         raise InputError(f"{source.name}: is empty; the command that made it may have failed")
+    if not journal and (source.name.endswith(JOURNAL) or source.content[:4] == _ARROW_STREAM):
+        raise InputError(
+            f"{source.name}: is the journal of a run; make its file with "
+            f"'dmpcli recover {path} -o FILE'"
+        )
     return source
 
 
@@ -140,11 +154,22 @@ def write(path: str | Path, content: bytes) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         temporary.replace(file)
+        with contextlib.suppress(OSError):  # some network file systems cannot
+            sync_folder(file.parent)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring a new name to the disk; OSError where the file system cannot."""
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
 
 
 def _write_special(file: Path, content: bytes) -> None:
@@ -157,6 +182,7 @@ def _write_special(file: Path, content: bytes) -> None:
 
 PART = "part-*.parquet"
 TABLE = "pairs.parquet"
+MANIFEST = "_manifest.json"
 
 
 def check_folder(path: str | Path) -> None:
@@ -179,27 +205,17 @@ def check_folder(path: str | Path) -> None:
         raise InputError(f"{path}: the folder {place} is not writable")
 
 
-@contextlib.contextmanager
-def dataset(path: str | Path) -> Iterator[Path]:
-    """Yield a folder to write parts and their table into; they take their place when all is done.
+def read_table(folder: str | Path) -> Source:
+    """Read the table of pairs of a finished batch.
 
-    Until then an older dataset stays whole; after an error or an interrupt nothing is left behind.
-    Then the older table goes first and the new one comes last, so that a folder with a table is a
-    finished one. Files of other names are left alone.
+    Raises
+    ------
+    InputError
+        The folder holds no batch, or one that is not finished.
     """
-    folder = Path(path)
-    temporary = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.tmp")
-    try:
-        temporary.mkdir()
-        yield temporary
-        folder.mkdir(exist_ok=True)
-        (folder / TABLE).unlink(missing_ok=True)
-        for part in sorted(folder.glob(PART)):
-            part.unlink()
-        for part in sorted(temporary.glob(PART)):
-            part.replace(folder / part.name)
-        (temporary / TABLE).replace(folder / TABLE)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    if not (Path(folder) / TABLE).is_file():
+        raise InputError(
+            f"{folder}: holds no finished batch ({TABLE} is missing); the command that draws it "
+            "goes on from the parts that are there"
+        )
+    return read(Path(folder) / TABLE)

@@ -1,18 +1,29 @@
-"""Tables from elsewhere: CSV and Parquet files whose columns and units are not ours."""
+"""Tables from elsewhere: CSV and Parquet files whose columns and units are not ours.
+
+Text stays in Arrow's buffers until somebody asks for numbers: a million rows are then no more than
+their bytes, and a bad cell can still be shown as it stands in the file.
+"""
 
 import io
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
-from dmpcli.arrays import AnyArray, Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import record
+from dmpcli.records import columns, record
 from dmpcli.records.streams import Source
 
 PARQUET_MAGIC = b"PAR1"
+
+_BLOCK = 1 << 24
+_NUMBER = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"
+_PASSED_OVER = re.compile(rb"^[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
+_SEPARATORS = (b",", b";", b"\t")
 
 
 @dataclass(frozen=True)
@@ -23,17 +34,18 @@ class Table:
     ----------
     name : str
         What messages call the file.
-    columns : dict of array
-    lines : sequence of int, optional
+    columns : mapping
+        Arrays of numpy or Arrow, by the file's own names.
+    lines : array of int, shape (rows,), optional
         The line of each row in a text file; without it rows are counted from 1.
     """
 
     name: str
-    columns: dict[str, AnyArray]
-    lines: Sequence[int] | None = None
+    columns: Mapping[str, Any]
+    lines: Integers | None = None
 
     def __len__(self) -> int:
-        return len(next(iter(self.columns.values()), np.empty(0)))
+        return len(next(iter(self.columns.values()), ()))
 
     def at(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
@@ -70,23 +82,61 @@ class Table:
                 f"{self.name}: column {column!r} is missing; it has {', '.join(self.columns)}"
             )
         values = self.columns[column]
-        if values.dtype.kind in "iufb":
+        if isinstance(values, np.ndarray):
             return values.astype(float)
-        import pandas as pd
+        return _floats(values)
 
-        return np.array(pd.to_numeric(pd.Series(values), errors="coerce"), dtype=float)
+    def texts(self, column: str) -> list[str]:
+        """Return a column as text, numbers as a file shows them."""
+        values = self.columns[column]
+        if isinstance(values, np.ndarray):
+            return [str(value) for value in values]
+        return ["" if value is None else str(value) for value in values.to_pylist()]
 
     def empty(self, column: str) -> Booleans:
         """Tell which cells of a column hold nothing, shape (rows,)."""
         values = self.columns[column]
-        if values.dtype.kind == "f":
-            return np.isnan(values)
-        return np.array([v is None or str(v).strip() == "" for v in values], dtype=bool)
+        if isinstance(values, np.ndarray):
+            return np.asarray(np.isnan(values.astype(float)))
+        if _is_text(values.type):
+            import pyarrow.compute as pc
+
+            blank = pc.equal(pc.utf8_trim_whitespace(values), "")
+            return np.array([value is not False for value in blank.to_pylist()], dtype=bool)
+        return np.isnan(_floats(values))
 
     def shown(self, column: str, row: int) -> str:
         """Return a cell as a message shows it."""
         value = self.columns[column][row]
+        value = value.as_py() if isinstance(value, pa.Scalar) else value
         return "an empty cell" if value is None or str(value).strip() == "" else repr(str(value))
+
+
+def _is_text(kind: Any) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _floats(values: Any) -> Floats:
+    """Numbers of an Arrow array; NaN where there is none."""
+    import pyarrow.compute as pc
+
+    if _is_text(values.type):
+        text = pc.utf8_trim_whitespace(values)
+        try:
+            values = text.cast(pa.float64())
+        except pa.ArrowInvalid:
+            number = pc.match_substring_regex(text, _NUMBER)
+            text = pc.if_else(number, pc.utf8_ltrim(text, characters="+"), None)
+            values = text.cast(pa.float64())
+    else:
+        try:
+            values = values.cast(pa.float64())
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+            return np.full(len(values), np.nan)
+    # Not by to_numpy: it would import pandas only to ask what this is.
+    found = columns.numbers(values)
+    found[columns.nulls(values)] = np.nan
+    return found
 
 
 def is_parquet(source: Source) -> bool:
@@ -98,7 +148,7 @@ def read(source: Source) -> Table:
     """Read a CSV or Parquet table whole.
 
     CSV files have a header line; the separator is the first of ``, ; tab`` that the header holds,
-    else runs of spaces. Lines that begin with ``#`` are passed over.
+    else runs of spaces. Empty lines and lines that begin with ``#`` are passed over.
 
     Raises
     ------
@@ -113,57 +163,73 @@ def read(source: Source) -> Table:
 
 def _parquet(source: Source) -> Table:
     table = record.parquet_table(source)
-    return Table(source.name, {name: table.column(name).to_numpy() for name in table.column_names})
+    return Table(
+        source.name, {name: table.column(name).combine_chunks() for name in table.column_names}
+    )
 
 
 def _csv(source: Source) -> Table:
-    import pandas as pd
+    from pyarrow import csv
 
-    try:
-        text = source.content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{source.name}: is neither a Parquet file nor text in UTF-8") from None
-    lines = [
-        (number, line) for number, line in enumerate(text.splitlines(), start=1) if _counts(line)
-    ]
-    if not lines:
-        raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
-    separator = next((s for s in ",;\t" if s in lines[0][1]), r"\s+")
-    _check_lengths(source.name, lines, separator)
-    try:
-        # As text: numbers are parsed by column, so that a bad cell can be named with its line.
-        frame: Any = pd.read_csv(
-            io.StringIO("\n".join(line for _, line in lines)),
-            sep=separator,
-            dtype=str,
-            keep_default_na=False,
-            skipinitialspace=True,
-        )
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
-        reason = str(error).strip().splitlines()[0]
-        raise InputError(f"{source.name}: cannot be read as a table: {reason}") from None
-    names = [name.strip().strip('"') for name in _cells(lines[0][1], separator)]
+    text, lines = _counted(source)
+    header, _, body = text.partition(b"\n")
+    separator = next((s for s in _SEPARATORS if s in header), b" ")
+    if separator == b" ":
+        # Runs of spaces: one is left of each.
+        header, body = re.sub(rb"[ \t]+", b" ", header), re.sub(rb"[ \t]+", b" ", body)
+        header, body = header.strip(), re.sub(rb"^ | $", b"", body, flags=re.MULTILINE)
+    elif b'"' in body:
+        body = re.sub(re.escape(separator) + rb"[ \t]+\"", separator + b'"', body)
+    names = [name.strip().strip('"').strip() for name in header.decode().split(separator.decode())]
     twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
     if twice is not None:
         raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
-    columns = {str(name).strip(): frame[name].to_numpy(dtype=object) for name in frame.columns}
-    return Table(source.name, columns, [number for number, _ in lines[1:]])
+    if not body:
+        raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
+    # As text: numbers are parsed by column, so that a bad cell can be named with its line.
+    try:
+        table = csv.read_csv(
+            io.BytesIO(body),
+            read_options=csv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
+            parse_options=csv.ParseOptions(
+                delimiter=separator.decode(), newlines_in_values=b'"' in body
+            ),
+            convert_options=csv.ConvertOptions(
+                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
+            ),
+        )
+    except pa.ArrowInvalid as error:
+        raise InputError(f"{source.name}: {_complaint(str(error), lines, len(names))}") from None
+    return Table(
+        source.name,
+        {name: table.column(name).combine_chunks() for name in table.column_names},
+        lines[1 : 1 + table.num_rows],
+    )
 
 
-def _counts(line: str) -> bool:
-    return bool(line.strip()) and not line.lstrip().startswith("#")
+def _counted(source: Source) -> tuple[bytes, Integers]:
+    """Lines of a text file that count, joined, and the number of each."""
+    content = source.content.removeprefix(b"\xef\xbb\xbf")
+    try:
+        # Only to know that it is text; Arrow takes the bytes.
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{source.name}: is neither a Parquet file nor text in UTF-8") from None
+    if b"\r" in content:
+        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    content = content.rstrip(b"\n")
+    if _PASSED_OVER.search(content) is None:
+        return content, np.arange(1, content.count(b"\n") + 2)
+    every = content.split(b"\n")
+    kept = [number for number, line in enumerate(every) if not _PASSED_OVER.fullmatch(line)]
+    return b"\n".join([every[number] for number in kept]), np.array(kept, dtype=np.int64) + 1
 
 
-def _check_lengths(name: str, lines: Sequence[tuple[int, str]], separator: str) -> None:
-    header = len(_cells(lines[0][1], separator))
-    for number, line in lines:
-        count = len(_cells(line, separator))
-        if count != header and '"' not in line:
-            raise InputError(
-                f"{name}: line {number} has {count} columns, the header has {header}; "
-                "mend or remove the line"
-            )
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return line.split() if separator == r"\s+" else line.split(separator)
+def _complaint(error: str, lines: Integers, expected: int) -> str:
+    """Say what Arrow found wrong with a table's shape, by the line of the file."""
+    found = re.search(r"Row #(\d+): Expected \d+ columns, got (\d+)", error)
+    if found is None:
+        return f"cannot be read as a table: {error.strip().splitlines()[0]}"
+    # Arrow counts the rows after the header from 1.
+    line = lines[min(int(found[1]), len(lines) - 1)]
+    return f"line {line} has {found[2]} columns, the header has {expected}; mend or remove the line"

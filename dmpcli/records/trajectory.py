@@ -7,12 +7,12 @@ import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.primitives.drawing import Stroke
+from dmpcli.primitives.drawing import Block, Stroke
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
 from dmpcli.records import schemas
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
-from dmpcli.records.record import Provenance, Record
+from dmpcli.records.record import Provenance, Record, repeated
 from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
 
 
@@ -53,8 +53,8 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenan
         At least one; all with orientation or all without, all flat or all on a curved surface.
     p : Provenance
     """
-    columns: dict[str, AnyArray] = {
-        "id": np.repeat(np.array(ids, dtype=object), [len(s.timing.t) for s in strokes]),
+    columns: dict[str, Any] = {
+        "id": repeated(ids, [len(s.timing.t) for s in strokes]),
         "t": np.concatenate([s.timing.t for s in strokes]),
     }
     position = np.concatenate([s.position for s in strokes])
@@ -68,6 +68,34 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenan
         normal = np.concatenate(normals)
         columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
     return Record(schemas.TRAJECTORY, columns, p)
+
+
+def block_record(ids: Sequence[str], block: Block, p: Provenance) -> Record:
+    """Return the record of all strokes of one block: as `trajectory_record`, without a loop.
+
+    Parameters
+    ----------
+    ids : sequence of str, length B
+    block : Block
+        All of it drawn.
+    p : Provenance
+    """
+    count, samples = block.position.shape[:2]
+    columns: dict[str, Any] = {
+        "id": repeated(ids, samples),
+        "t": np.tile(block.timing.t, count),
+    }
+    columns |= {name: _column(block.position[..., i]) for i, name in enumerate(POSITION)}
+    if block.euler is not None:
+        columns |= {name: _column(block.euler[..., i]) for i, name in enumerate(EULER_ANGLES)}
+    if block.normal is not None and block.normal.shape[1] > 1:
+        columns |= {name: _column(block.normal[..., i]) for i, name in enumerate(NORMAL)}
+    return Record(schemas.TRAJECTORY, columns, p)
+
+
+def _column(values: Floats) -> Floats:
+    """Values (B, T), one stroke after the other; alike strokes may share one row's memory."""
+    return values.ravel() if values.strides[0] else np.tile(values[0], len(values))
 
 
 def pairs_record(

@@ -46,6 +46,10 @@ class Mesh:
         self._tree = igl.AABB()
         self._tree.init(self.V, self.F)
 
+    def __reduce__(self) -> tuple[type["Mesh"], tuple[Floats, Integers]]:
+        # The search tree does not travel to another process; it is built there again.
+        return Mesh, (self.V, self.F)
+
     @cached_property
     def corners(self) -> Floats:
         """Corners of the faces, shape (m, 3, 3), mm."""

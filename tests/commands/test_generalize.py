@@ -152,6 +152,7 @@ def write_pairs(path, rows, columns="id,x0,y0,z0,xg,yg,zg,duration"):
     return path
 
 
+PARTS = [f"part-0000{number}.parquet" for number in range(9)]
 GOOD = ["a,0,0,0,100,0,0,5", "b,10,0,0,60,40,0,", "c,0,5,0,-80,0,0,7.5"]
 BAD = ["d,1,nan,3,4,5,6,7", "e,1,2,3,1,2,3,4", "f,0,0,0,0,0,70,2"]
 
@@ -176,12 +177,12 @@ def test_parts_hold_two_thousand_pairs_and_older_parts_go(learned, tmp_path):
     table = write_pairs(tmp_path / "p.csv", rows)
     run(learned, "-o", tmp_path / "batch", "--pairs", table, "--rate", 20)
     names = sorted(path.name for path in (tmp_path / "batch").iterdir())
-    assert names == ["pairs.parquet", *(f"part-0000{i}.parquet" for i in range(3))]
+    assert names == ["_manifest.json", "pairs.parquet", *PARTS[:3]]
     last = read(tmp_path / "batch" / "part-00002.parquet")
     assert last.columns["id"][0] == "4000"
     run(learned, "-o", tmp_path / "batch", "--pairs", write_pairs(tmp_path / "p.csv", rows[:5]))
     names = sorted(path.name for path in (tmp_path / "batch").iterdir())
-    assert names == ["pairs.parquet", "part-00000.parquet"]
+    assert names == ["_manifest.json", "pairs.parquet", "part-00000.parquet"]
 
 
 def test_stop_refuses_the_table_before_anything_is_written(learned, tmp_path):

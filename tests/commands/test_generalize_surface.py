@@ -127,7 +127,7 @@ def test_with_on_border_skip_only_strokes_over_the_border_are_left_out(learned, 
 
     done = batch(flat, edge, START + GOAL)
     assert done.exit_code == 0, done.stderr
-    assert "2 strokes drawn, 1 pairs skipped" in done.stderr
+    assert "2 strokes drawn, 1 pair skipped" in done.stderr
     status = read(tmp_path / "b" / "pairs.parquet").columns["status"]
     assert [s == "ok" for s in status] == [True, False, True]
     assert "leaves the mesh" in status[1]
@@ -165,7 +165,7 @@ def test_many_pairs_on_a_mesh_equal_each_alone_and_bad_ones_are_named(learned, t
     assert not (tmp_path / "b").exists()
     done = run(learned, "-o", tmp_path / "b", *batch, "--on-error", "skip")
     assert done.exit_code == 0, done.stderr
-    assert "2 strokes drawn, 1 pairs skipped" in done.stderr
+    assert "2 strokes drawn, 1 pair skipped" in done.stderr
     part = read(tmp_path / "b" / "part-00000.parquet")
     run(learned, "-o", tmp_path / "t", *CURVED, "--surface", BENCH)
     alone = read(tmp_path / "t")

@@ -34,7 +34,7 @@ def test_our_files_tell_schema_columns_units_ranges_and_provenance(tmp_path):
     assert columns["x"]["least"] == pytest.approx(-660.021)
     assert columns["x"]["largest"] == pytest.approx(-551.03)
     assert told["provenance"]["command"] == "record"
-    assert told["provenance"]["facts"] == {"simulated": True}
+    assert told["provenance"]["facts"]["simulated"] is True
 
 
 @pytest.mark.parametrize("name", ["demo", "modified", "drawn"])
@@ -44,6 +44,14 @@ def test_every_kind_of_record_is_described_in_a_hundred_columns(tmp_path, name):
     assert max(map(len, result.stdout.splitlines())) <= 100
     for word in ("version 1", "sha256", "unit", "50 Hz"):
         assert word in result.stdout
+
+
+def test_the_rate_is_that_of_all_rows_however_they_came(tmp_path):
+    uneven = demonstration()
+    t = uneven.columns["t"]
+    t[1:-1] += np.where(np.arange(len(t) - 2) % 3, -0.004, 0.004)
+    told = json.loads(dmpcli(put(tmp_path, "demo", uneven), "--json").stdout)["found"]
+    assert told["rate"] == pytest.approx(50.0)
 
 
 def test_several_strokes_in_a_file_are_counted(tmp_path):

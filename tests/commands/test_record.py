@@ -1,3 +1,4 @@
+import os
 import signal
 import subprocess
 import sys
@@ -14,10 +15,13 @@ from dmpcli.drag import enter
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import clock, urls
 from dmpcli.instruments.mock import PEN, MockServo
-from dmpcli.records import streams, tool
-from dmpcli.records.record import decode
+from dmpcli.records import journal, streams, tool
+from dmpcli.records.journal import Journal
+from dmpcli.records.record import Provenance, decode
+from dmpcli.records.rows import Rows
 from dmpcli.records.schemas import DEMONSTRATION
 from dmpcli.records.streams import Source, read
+from tests.drag.drag_fakes import drag_settings
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(record.command)
@@ -120,7 +124,7 @@ def test_a_csv_and_a_tool_file_stand_in_the_provenance_by_their_hash(tmp_path):
         (["--preset", "heavy"], InputError, "--preset heavy: no such preset"),
         (["--tool", "none.json"], InputError, "none.json: no such file"),
         (["--robot", "elite://10.0.0.1"], InputError, "beside a mock sensor"),
-        (["--robot", "ur://h", "--sensor", "netft://h"], InputError, "speaks mock: only"),
+        (["--robot", "ur://h", "--sensor", "laser://h"], InputError, "one of mock:, netft://"),
         (["--robot", "mock:?estop_at=0"], RefusedError, "emergency stop"),
         (["--sensor", "mock:?silent_at=0"], InstrumentError, "sends nothing"),
     ],
@@ -197,7 +201,7 @@ def test_a_signal_ends_the_recording_which_is_kept(tmp_path, monkeypatch, number
     out = tmp_path / "demo.parquet"
     result = run("-o", out)
     assert result.exit_code == 128 + number
-    assert "asked to end" in result.stderr
+    assert "stopped after braking to rest" in result.stderr.splitlines()[-1]
     assert demonstration(out).t[-1] == pytest.approx(1.5, abs=0.05)
     assert signal.getsignal(number) == before
 
@@ -242,6 +246,56 @@ def half_real(monkeypatch):
     monkeypatch.setattr(urls, "connect", pretend)
     monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
     return ("--sensor", "netft://10.0.0.7", "--allow-mixed", "--duration", 2)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--reference", "line"),
+        ("--start", -550, 130, -17),
+        ("--goal", -650, 130, -17),
+        ("--wave-height", 30),
+        ("--periods", 2),
+        ("--seed", 3),
+    ],
+)
+def test_options_of_the_mocks_hand_are_refused_where_a_person_draws(tmp_path, option):
+    real = ("--robot", "elite://10.0.0.7", "--sensor", "netft://10.0.0.8", "--tool", "pen.json")
+    with pytest.raises(InputError, match=f"{option[0]}: is of the mock's hand"):
+        run("-o", tmp_path / "demo.parquet", *real, *option)
+
+
+def test_a_persons_recording_says_nothing_of_a_reference():
+    settings = drag_settings()
+    known = record._provenance(settings, {"robot": "elite"}, False, None, None)
+    assert known.facts == {"simulated": False}
+    assert known.options["damping"] == list(settings.damping)
+    assert not known.options.keys() & {"reference", "start", "goal", "wave_height", "seed"}
+
+
+@pytest.mark.parametrize("stale", [False, True])
+def test_a_recording_that_goes_on_is_not_disturbed_by_another_of_its_name(
+    tmp_path, half_real, monkeypatch, stale
+):
+    def never(*_, **__):
+        raise AssertionError("the instruments were reached")
+
+    monkeypatch.setattr(urls, "connect", never)
+    pen, out = tmp_path / "pen.json", tmp_path / "demo.parquet"
+    pen.write_bytes(tool.encode(PEN))
+    going = Journal(
+        journal.beside(str(out)), Rows({"t": 1}), DEMONSTRATION, Provenance("record", {})
+    )
+    if stale:
+        going._end_thread()
+        os.close(going._file)
+    try:
+        with pytest.raises(InputError, match="recover" if stale else "another dmpcli is writing"):
+            run("-o", out, *half_real, "--tool", pen)
+        assert not out.exists()
+    finally:
+        if not stale:
+            going.discard()
 
 
 def test_a_real_sensor_without_its_tool_is_refused(tmp_path, half_real):

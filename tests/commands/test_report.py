@@ -123,6 +123,14 @@ def test_tables_fit_eighty_columns_and_say_what_was_measured(files):
         assert text in result.stdout
 
 
+def test_what_a_person_drew_at_a_real_arm_is_not_measured_against_the_paper(tmp_path, files):
+    real = demonstration(facts={"reference": None})
+    del real.provenance.facts["reference"]
+    assert document(put(tmp_path, "real", real), files["modified"])["paper"] == []
+    told = demonstration(facts={"simulated": False, "reference": {"shape": "csv"}})
+    assert document(put(tmp_path, "told", told), files["modified"])["paper"]
+
+
 def test_each_wave_is_listed_where_there_are_several(tmp_path):
     path = put(tmp_path, "three", trajectory(wave(periods=3, height=20.0, n=2001)))
     assert re.search(r"three +(20\.000 *){5}", dmpcli(path).stdout)

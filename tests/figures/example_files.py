@@ -34,7 +34,7 @@ def demonstration(path=None, drag="admittance", noise=0.0, facts=None, dt=0.02):
     path = wave() if path is None else path
     path = path + noise * np.random.default_rng(7).standard_normal(path.shape)
     columns = {"t": np.arange(len(path)) * dt} | dict(zip(POSITION, path.T, strict=True))
-    said = {"simulated": True} | (facts or {})
+    said = {"simulated": True, "reference": {"shape": "csv"}} | (facts or {})
     return Record(schemas.DEMONSTRATION, columns, Provenance("record", {"drag": drag}, (), said))
 
 

@@ -66,6 +66,21 @@ def test_every_field_carries_its_unit():
         assert all(column.unit for column in kind.columns.values())
 
 
+@given(st.lists(st.tuples(st.text(max_size=4), st.integers(0, 3)), min_size=1, max_size=20))
+def test_repeated_texts_are_those_of_a_plain_loop(words):
+    texts, counts = zip(*words, strict=True)
+    found = record.repeated(texts, counts)
+    found.validate(full=True)
+    assert found.to_pylist() == [text for text, count in words for _ in range(count)]
+    assert record.repeated(texts, 2).to_pylist() == [text for text in texts for _ in range(2)]
+
+
+def test_opposite_infinities_are_no_nulls():
+    column = record._arrow(np.array([np.inf, 1.0, -np.inf]), pa.float64())
+    assert column.to_pylist() == [np.inf, 1.0, -np.inf]
+    assert column.null_count == 0
+
+
 def test_missing_orientation_stays_missing_and_nan_is_stored_as_null():
     rx = np.full(12, np.nan)
     found = record.decode(Source("a", record.encode(demonstration(rx=rx, ry=rx, rz=rx))))

@@ -1,5 +1,6 @@
 """Outputs appear whole or not at all; inputs that cannot be read are named."""
 
+import errno
 import os
 import stat
 
@@ -15,6 +16,28 @@ def test_write_replaces_whole_and_leaves_no_temporary(tmp_path):
     streams.write(target, b"new")
     assert target.read_bytes() == b"new"
     assert os.listdir(tmp_path) == ["a.json"]
+
+
+def test_the_new_name_is_on_the_disk_when_the_write_is_over(tmp_path, monkeypatch):
+    synced = []
+
+    def sync(number):
+        # What is synced, and whether the output has its name by then.
+        synced.append((stat.S_ISDIR(os.fstat(number).st_mode), (tmp_path / "out").exists()))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    streams.write(tmp_path / "out", b"new")
+    assert synced == [(False, False), (True, True)]
+
+
+def test_a_folder_that_cannot_be_synced_costs_nothing(tmp_path, monkeypatch):
+    def sync(number):
+        if stat.S_ISDIR(os.fstat(number).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", sync)
+    streams.write(tmp_path / "out", b"new")
+    assert (tmp_path / "out").read_bytes() == b"new"
 
 
 def test_a_failing_write_keeps_the_old_file(tmp_path, monkeypatch):
@@ -67,42 +90,6 @@ def test_a_dataset_folder_is_refused_where_a_file_lies(tmp_path):
         streams.check_folder("-")
     with pytest.raises(InputError, match="does not exist"):
         streams.check_folder(tmp_path / "no" / "batch")
-
-
-def write_dataset(path, content):
-    with streams.dataset(path) as folder:
-        (folder / "part-00000.parquet").write_bytes(content)
-        (folder / "pairs.parquet").write_bytes(content)
-
-
-def test_a_dataset_replaces_an_older_one_and_leaves_other_files_alone(tmp_path):
-    batch = tmp_path / "batch"
-    batch.mkdir()
-    for name in ("part-00000.parquet", "part-00001.parquet", "pairs.parquet", "notes.txt"):
-        (batch / name).write_bytes(b"old")
-    write_dataset(batch, b"new")
-    assert {p.name: p.read_bytes() for p in batch.iterdir()} == {
-        "part-00000.parquet": b"new",
-        "pairs.parquet": b"new",
-        "notes.txt": b"old",
-    }
-    assert os.listdir(tmp_path) == ["batch"]
-
-
-@pytest.mark.parametrize("error", [InputError, KeyboardInterrupt, SystemExit, ZeroDivisionError])
-def test_an_older_dataset_stays_whole_when_the_new_one_fails(tmp_path, error):
-    write_dataset(tmp_path / "batch", b"old")
-
-    def interrupted():
-        with streams.dataset(tmp_path / "batch") as folder:
-            (folder / "part-00000.parquet").write_bytes(b"half")
-            raise error
-
-    with pytest.raises(error):
-        interrupted()
-    assert os.listdir(tmp_path) == ["batch"]
-    assert (tmp_path / "batch" / "part-00000.parquet").read_bytes() == b"old"
-    assert (tmp_path / "batch" / "pairs.parquet").read_bytes() == b"old"
 
 
 def test_a_link_is_followed_and_a_named_pipe_is_written_to(tmp_path):

@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 
+from dmpcli.batch import workers
+from dmpcli.batch.job import Job, Task, settle
+from dmpcli.batch.run import Batch
 from dmpcli.errors import RefusedError
 from dmpcli.primitives.drawing import Style, draw
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.preparation import Choices
-from dmpcli.records import dataset, record, streams
+from dmpcli.records import record, streams
 from dmpcli.records.pairs import OK, PairTable
-from dmpcli.records.record import Provenance
+from dmpcli.records.record import Form, Provenance
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.protocol import Status
 from tests.primitives.strokes import paper_stroke
@@ -33,17 +36,16 @@ def table_of(*ends):
     ends = np.array(ends)
     ids = [str(i) for i in range(len(ends))]
     pairs = Pairs(ends[:, :3], ends[:, 3:], None, None)
-    places = [f"line {i + 2}" for i in range(len(ends))]
-    return PairTable("p.csv", ids, pairs, places, np.full(len(ends), np.nan), [OK] * len(ends))
+    lines = np.arange(2, 2 + len(ends))
+    return PairTable("p.csv", ids, pairs, lines, np.full(len(ends), np.nan), [OK] * len(ends))
 
 
 def write(folder, skill, mesh, table, on_border, stop=True):
-    task = dataset.Task(skill, mesh, Style(), on_border)
+    form, provenance = Form(), Provenance("generalize")
+    job = Job(Task(skill, mesh, Style(), on_border), stop, provenance, form, str(folder))
     lasting = np.full(len(table), skill.duration)
     done = []
-    dataset.write(
-        folder, task, table, table.pairs, lasting, Provenance("generalize"), stop, done.append
-    )
+    Batch(job, table, table.pairs, lasting, 2000).run(workers.here, done.append)
     return done
 
 
@@ -53,9 +55,9 @@ def test_settled_clips_skips_or_refuses(skill, mesh):
     inside, over = draw(skill, table.pairs, lasting, mesh, Style())
     assert over.status == Status.BORDER
     for on_border in ("fail", "clip", "skip"):
-        task = dataset.Task(skill, mesh, Style(), on_border)
-        assert dataset.settled(task, inside) == (inside, OK)
-        kept, status = dataset.settled(task, over)
+        task = Task(skill, mesh, Style(), on_border)
+        assert settle(task, [inside]) == [(inside, OK)]
+        [(kept, status)] = settle(task, [over])
         assert (status == OK) == (on_border == "clip")
         assert len(kept.position) < len(over.position) or on_border != "clip"
         assert np.abs(kept.position[:, 1]).max() <= 75.0 + 1e-6 or on_border != "clip"

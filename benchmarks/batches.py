@@ -1,0 +1,366 @@
+"""What a batch costs from the command line. ``python -m benchmarks.batches FOLDER [SECTION ...]``.
+
+Sections, all without a word: ``pyarrow`` holds 100,000 pairs × 500 samples with two jobs against
+pyarrow writing the same parts from memory in two processes; ``growth`` the cost per pair and the
+memory from 20,000 to 1,000,000 pairs with --float32 (3 GB in FOLDER for a while); ``mesh`` strokes
+on 50,000 faces against the same without files; ``dask`` two local workers against two jobs; ``bad``
+a table with 1 % bad rows. Runs that are compared alternate; medians.
+"""
+
+import filecmp
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import trimesh
+
+from benchmarks.cluster_demo import BIN, cluster
+from benchmarks.surfaces import FACES
+from dmpcli.arrays import Floats
+from dmpcli.batch import memory
+from dmpcli.batch.job import Task
+from dmpcli.primitives.drawing import Style, draw_blocks
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.records import skill as skill_file
+from dmpcli.records import streams
+from dmpcli.surfaces.mesh import Mesh
+from tests.surfaces import cases, fields
+
+HEADER = "x0,y0,z0,xg,yg,zg"
+MANY, MILLION, FEW = 100_000, 1_000_000, 20_000
+ROUNDS = 4
+PLATE = -17.5
+
+
+def main() -> None:
+    """Run the sections that are named on the command line, or all."""
+    place = Path(sys.argv[1])
+    place.mkdir(parents=True, exist_ok=True)
+    reference = Path("sample_runs/reference.parquet")
+    subprocess.run([BIN / "dmpcli", "fit", reference, "-o", place / "skill.json", "-q"], check=True)
+    sections: dict[str, Callable[[Path], None]] = {
+        "pyarrow": against_pyarrow,
+        "growth": growth,
+        "mesh": on_a_mesh,
+        "dask": against_dask,
+        "bad": bad_rows,
+    }
+    for name in sys.argv[2:] or sections:
+        sections[name](place)
+        print(flush=True)
+
+
+def level_pairs(count: int) -> Floats:
+    """Start-goal pairs, shape (count, 6), 60 to 160 mm apart on a level plate."""
+    rng = np.random.default_rng(5)
+    start = rng.uniform([-800.0, -300.0, PLATE], [-400.0, 300.0, PLATE], (count, 3))
+    angle, length = rng.uniform(-np.pi, np.pi, count), rng.uniform(60.0, 160.0, count)
+    way = length[:, None] * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    return np.hstack([start, start + way])
+
+
+def table_of(place: Path, rows: Floats, name: str) -> Path:
+    """Write pairs as CSV, once."""
+    path = place / f"{name}.csv"
+    if not path.exists():
+        np.savetxt(path, rows, fmt="%.3f", delimiter=",", header=HEADER, comments="")
+    return path
+
+
+def command(place: Path, table: Path, folder: Path, *options: object) -> list[str]:
+    """Return the command line of a batch; its folder is removed first."""
+    shutil.rmtree(folder, ignore_errors=True)
+    words = [BIN / "dmpcli", "generalize", place / "skill.json", "--pairs", table, "-o", folder]
+    return [str(word) for word in (*words, "-q", *options)]
+
+
+def seconds(words: list[str]) -> float:
+    """Run a command, with nothing waiting to be written to the disk, and return the wall time."""
+    os.sync()
+    begin = time.perf_counter()
+    subprocess.run(words, check=True)
+    return time.perf_counter() - begin
+
+
+def spread(times: Iterable[float]) -> str:
+    """Median and range."""
+    found = sorted(times)
+    return f"{np.median(found):.2f} ({found[0]:.2f} to {found[-1]:.2f})"
+
+
+def against_pyarrow(place: Path) -> None:
+    """Print wall times and memory beside what writing alone takes."""
+    table = table_of(place, level_pairs(MANY), "many")
+    folder, bare = place / "batch", place / "bare"
+    words = command(place, table, folder, "--jobs", 2)
+    rss, pss = peak(words)
+    parts = sorted(folder.glob(streams.PART))
+    writers = [Writer(parts[i::2], bare) for i in range(2)]
+    ours, theirs = [], []
+    for _ in range(ROUNDS):
+        shutil.rmtree(bare, ignore_errors=True)
+        bare.mkdir()
+        os.sync()
+        begin = time.perf_counter()
+        for writer in writers:
+            writer.start()
+        for writer in writers:
+            writer.wait()
+        theirs.append(time.perf_counter() - begin)
+        same, _, _ = filecmp.cmpfiles(folder, bare, [part.name for part in parts], shallow=False)
+        assert len(same) == len(parts), "pyarrow alone wrote something else"
+        ours.append(seconds(command(place, table, folder, "--jobs", 2)))
+    for writer in writers:
+        writer.end()
+    size = sum(part.stat().st_size for part in parts)
+    shutil.rmtree(bare)
+    shutil.rmtree(folder)
+    ratio = np.median(ours) / np.median(theirs)
+    print(f"| {MANY} pairs × 500 samples, {size / 1e6:.0f} MB | two processes |")
+    print("| --- | ---: |")
+    print(f"| pyarrow alone, from memory, s | {spread(theirs)} |")
+    print(f"| dmpcli generalize --jobs 2, s | {spread(ours)} |")
+    print(f"| ratio of the medians (≤ 1.5) | {ratio:.2f} |")
+    print(f"| peak memory of all processes, RSS / PSS, MiB | {rss:.0f} / {pss:.0f} |")
+
+
+class Writer:
+    """A process that holds the tables of some parts in memory and writes them when told."""
+
+    def __init__(self, parts: list[Path], folder: Path) -> None:
+        self.pipe, theirs = multiprocessing.Pipe()
+        context = multiprocessing.get_context("spawn")
+        self.process = context.Process(target=hold_and_write, args=(parts, folder, theirs))
+        self.process.start()
+        self.wait()
+
+    def start(self) -> None:
+        """Have it write."""
+        self.pipe.send(True)
+
+    def wait(self) -> None:
+        """Return when it has."""
+        self.pipe.recv()
+
+    def end(self) -> None:
+        """End the process."""
+        self.pipe.send(False)
+        self.process.join()
+
+
+def hold_and_write(parts: list[Path], folder: Path, pipe: Connection) -> None:
+    """Hold the tables of parts, and write them whenever told, as `record.store` does."""
+    tables = [pq.ParquetFile(part).read().combine_chunks() for part in parts]
+    pipe.send(None)
+    while pipe.recv():
+        for part, table in zip(parts, tables, strict=True):
+            write(table, folder / part.name)
+        pipe.send(None)
+
+
+def write(table: Any, path: Path) -> None:
+    """Write a part with the options of `record.store`."""
+    floating = [field.name for field in table.schema if pa.types.is_floating(field.type)]
+    others = [name for name in table.column_names if name not in floating]
+    pq.write_table(
+        table, path, compression="zstd", use_byte_stream_split=floating, use_dictionary=others
+    )
+
+
+def peak(words: list[str]) -> tuple[float, float]:
+    """Run a command; return the largest sums of RSS and of PSS over its processes, MiB."""
+    process = subprocess.Popen(words)
+    largest = [0.0, 0.0]
+
+    def watch() -> None:
+        while process.poll() is None:
+            sums = np.sum([used(pid) for pid in family(process.pid)], axis=0)
+            largest[:] = np.maximum(largest, sums).tolist()
+            time.sleep(0.1)
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    watching.join()
+    assert process.returncode == 0
+    return largest[0], largest[1]
+
+
+def family(pid: int) -> list[int]:
+    """Return a process and all that come from it."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        children = []
+    return [pid, *(one for child in children for one in family(int(child)))]
+
+
+def used(pid: int) -> tuple[float, float]:
+    """RSS and PSS of a process, MiB; 0 for one that has ended."""
+    try:
+        lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]
+    except OSError:
+        return 0.0, 0.0
+    found = {line.split(":")[0]: float(line.split()[1]) / 1024 for line in lines}
+    return found.get("Rss", 0.0), found.get("Pss", 0.0)
+
+
+def growth(place: Path) -> None:
+    """Print cost per pair and memory from few pairs to a million."""
+    folder = place / "batch"
+    options = ("--jobs", 2, "--float32")
+    two = table_of(place, level_pairs(2), "two")
+    few = table_of(place, level_pairs(FEW), "few")
+    start, short = [], []
+    for _ in range(ROUNDS):
+        start.append(seconds(command(place, two, folder, "--pairs-per-part", 1, *options)))
+        short.append(seconds(command(place, few, folder, *options)))
+    rows = [(FEW, float(np.median(short)), *peak(command(place, few, folder, *options)))]
+    for count in (MANY, MILLION):
+        table = table_of(place, level_pairs(count), f"level-{count}")
+        words = command(place, table, folder, *options)
+        os.sync()
+        begin = time.perf_counter()
+        rss, pss = peak(words)
+        rows.append((count, time.perf_counter() - begin, rss, pss))
+    size = sum(part.stat().st_size for part in folder.glob("*"))
+    shutil.rmtree(folder)
+    print(f"Start-up {spread(start)} s; {MILLION} pairs are {size / 1e9:.1f} GB.\n")
+    print("| pairs | wall s | µs per pair without start-up | peak RSS / PSS, MiB |")
+    print("| ---: | ---: | ---: | ---: |")
+    for count, wall, rss, pss in rows:
+        each = 1e6 * (wall - np.median(start)) / count
+        print(f"| {count} | {wall:.2f} | {each:.1f} | {rss:.0f} / {pss:.0f} |")
+
+
+def on_a_mesh(place: Path) -> None:
+    """Print trajectories per second on a mesh, with and without files."""
+    folder, part = place / "batch", place / "bumpy.ply"
+    field = cases.FIELDS["bumpy"]
+    V, F = fields.square(field, FACES[1], reach=200.0)
+    trimesh.Trimesh(V, F, process=False).export(part)
+    few, many = 4_000, 16_000
+    rows = curved_pairs(many)
+    # The inner half: strokes that end near the border would leave it.
+    words = ("--jobs", 2, "--surface", part, "--snap-tol", 1, "--on-error", "skip")
+    short, long = [], []
+    memory_rate = in_memory(place, V, F, rows)
+    for _ in range(3):
+        for count, times in ((few, short), (many, long)):
+            table = table_of(place, rows[:count], f"curved-{count}")
+            times.append(seconds(command(place, table, folder, *words)))
+    good = sum(pq.read_metadata(p).num_rows for p in folder.glob(streams.PART)) // 501
+    shutil.rmtree(folder)
+    rate = (many - few) / (np.median(long) - np.median(short))
+    print(f"| {len(F)} faces, {many} pairs × 501 samples, two processes | trajectories/s |")
+    print("| --- | ---: |")
+    print(f"| in memory | {memory_rate:.0f} |")
+    print(f"| to Parquet, sustained from {few} to {many} pairs | {rate:.0f} |")
+    print(f"| ratio (≥ 0.8) | {rate / memory_rate:.2f} |")
+    print(f"| drawn, of {many} | {good} |")
+
+
+def curved_pairs(count: int) -> Floats:
+    """Start-goal pairs, shape (count, 6), 109 mm apart on the bumpy field."""
+    field = cases.FIELDS["bumpy"]
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(-80.0, 80.0, (count, 2))
+    t = field.tangent(xy, rng.uniform(0.0, 2.0 * np.pi, count))
+    ends = [
+        field.walk(xy[i : i + 1000], t[i : i + 1000], np.full(len(xy[i : i + 1000]), 109.0))[0]
+        for i in range(0, count, 1000)
+    ]
+    return np.hstack([field.point(*xy.T), field.point(*np.concatenate(ends).T)])
+
+
+_HELD: list[tuple[Task, Floats]] = []
+
+
+def in_memory(place: Path, V: Floats, F: Any, rows: Floats) -> float:
+    """Trajectories per second of two processes that draw parts and write nothing."""
+    skill, _ = skill_file.decode(streams.read(place / "skill.json"))
+    task = Task(skill, Mesh(V, F), Style(), "fail")
+    _HELD.append((task, rows))
+    firsts = list(range(0, 16_000, 2000))
+    with multiprocessing.get_context("fork").Pool(2, memory.keep) as pool:
+        pool.map(draw_only, [0, 0], chunksize=1)
+        times = []
+        for _ in range(3):
+            begin = time.perf_counter()
+            pool.map(draw_only, firsts, chunksize=1)
+            times.append(time.perf_counter() - begin)
+    return float(16_000 / np.median(times))
+
+
+def draw_only(first: int) -> None:
+    """Draw 2000 pairs as a part is drawn."""
+    task, rows = _HELD[0]
+    ends = rows[first : first + 2000]
+    pairs = Pairs(ends[:, :3], ends[:, 3:])
+    lasting = np.full(len(ends), task.skill.duration)
+    for _ in draw_blocks(task.skill, pairs, lasting, task.surface, task.style):
+        pass
+
+
+def against_dask(place: Path) -> None:
+    """Print wall times of two Dask workers and of two jobs."""
+    table = table_of(place, level_pairs(MANY), "many")
+    one, other = place / "batch", place / "dask"
+    jobs, dask = [], []
+    with cluster(place) as (address, _):
+        for _ in range(ROUNDS):
+            jobs.append(seconds(command(place, table, one, "--jobs", 2)))
+            dask.append(seconds(command(place, table, other, "--cluster", address)))
+        names = [path.name for path in one.iterdir()]
+        same, _, _ = filecmp.cmpfiles(one, other, names, shallow=False)
+    alike = len(same) == len(names) == len(list(other.iterdir()))
+    for folder in (one, other):
+        shutil.rmtree(folder)
+    print(f"| {MANY} pairs × 500 samples | wall s |")
+    print("| --- | ---: |")
+    print(f"| --jobs 2 | {spread(jobs)} |")
+    print(f"| two local Dask workers | {spread(dask)} |")
+    print(f"| ratio of the medians (≤ 1.5) | {np.median(dask) / np.median(jobs):.2f} |")
+    print(f"| same bytes | {'yes' if alike else 'NO'} |")
+
+
+def bad_rows(place: Path) -> None:
+    """Print what becomes of a table with 1 % bad rows on a plane."""
+    rows = level_pairs(MANY)
+    bad = np.arange(50, MANY, 100)
+    rows[bad[0::3], 1] = np.nan
+    rows[bad[1::3], 3:] = rows[bad[1::3], :3]
+    rows[bad[2::3], 2] += 30.0
+    table, folder = table_of(place, rows, "bad"), place / "batch"
+    plane = place / "plane.json"
+    plane.write_text(PLANE)
+    print(f"| {MANY} pairs, {len(bad)} of them bad | exit | strokes | rows named | last words |")
+    print("| --- | ---: | ---: | ---: | --- |")
+    for mode in ("skip", "stop"):
+        options = ("--surface", plane, "--jobs", 2, "--on-error", mode)
+        done = subprocess.run(command(place, table, folder, *options), stderr=subprocess.PIPE)
+        named = drawn = 0
+        if folder.is_dir():
+            status = pq.read_table(folder / streams.TABLE)["status"].to_pylist()
+            named = int(np.sum([status[row] != "ok" and "line" in status[row] for row in bad]))
+            drawn = status.count("ok")
+        last = done.stderr.decode().strip().splitlines()[-1].replace(f"{place}/", "")
+        print(f"| --on-error {mode} | {done.returncode} | {drawn} | {named} | {last} |")
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+PLANE = '{"point": [0, 0, -17.5], "normal": [0, 0, 1]}'
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""Drawing parts on the workers of a Dask cluster that is already there.
+
+Dask only carries parts to workers and outcomes back; the files are ours, so they are the same as
+from one machine, whatever the number of workers and whichever dies on the way. Every worker needs
+the same programs and must see the batch's folder under the same path.
+"""
+
+import platform
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+import pyarrow as pa
+import scipy
+
+from dmpcli import __version__
+from dmpcli.batch.job import Job, Outcome, Part, draw_part
+from dmpcli.batch.workers import Draw
+from dmpcli.errors import DmpError, InputError, InstrumentError
+
+PATIENCE = 5.0
+"""How long a scheduler may take to answer, s."""
+
+_AHEAD = 2
+_PLUGIN = "dmpcli-"
+
+
+def workers(address: str) -> Draw:
+    """Return what draws parts on a cluster.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, as ``tcp://HOST:8786``.
+
+    Raises
+    ------
+    InputError
+        Dask is not installed.
+    InstrumentError
+        Nobody answers there, or there are no workers.
+    """
+    try:
+        import distributed
+        import threadpoolctl  # noqa: F401
+    except ImportError:
+        raise InputError("--cluster: needs Dask; pip install 'dmpcli[dask]'") from None
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InstrumentError(
+            f"--cluster {address}: no scheduler answers ({type(error).__name__}); "
+            "check address and network"
+        ) from None
+
+    def draw(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
+        with client:
+            yield from _drawn(client, address, job, parts)
+
+    return draw
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that decide about the bytes of a part."""
+    return {
+        "dmpcli": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "pyarrow": pa.__version__,
+    }
+
+
+def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
+    from distributed import WorkerPlugin, as_completed
+
+    class Bringer(WorkerPlugin):  # type: ignore[misc]
+        """Brings the job once to each worker, those that come later too."""
+
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def setup(self, worker: Any) -> None:
+            from threadpoolctl import threadpool_limits
+
+            # With more threads the last bits of a product depend on the number of cores.
+            self.limits = threadpool_limits(1)
+            setattr(worker, self.name, job)
+
+        def teardown(self, worker: Any) -> None:
+            self.limits.restore_original_limits()
+            worker.__dict__.pop(self.name, None)
+
+    _check(client, address, Path(job.folder).absolute())
+    job = replace(job, folder=str(Path(job.folder).absolute()))
+    name = _PLUGIN + uuid4().hex
+    client.register_plugin(Bringer(name))
+    try:
+        waiting = as_completed(loop=client.loop, raise_errors=False)
+        ahead = _AHEAD * sum(client.ncores().values())
+        for part in parts:
+            waiting.add(client.submit(_draw, name, part, pure=False, retries=2))
+            if waiting.count() >= ahead:
+                yield _result(next(waiting), address)
+        for future in waiting:
+            yield _result(future, address)
+    finally:
+        client.unregister_worker_plugin(name)
+
+
+def _check(client: Any, address: str, folder: Path) -> None:
+    """Refuse a cluster whose workers would draw other bytes, or elsewhere."""
+    if not client.ncores():
+        raise InstrumentError(f"--cluster {address}: the scheduler has no workers; start some")
+    try:
+        found: dict[str, dict[str, str]] = client.run(versions)
+    except Exception as error:
+        raise InputError(
+            f"--cluster {address}: its workers cannot run dmpcli {__version__} ({error}); "
+            "install it there"
+        ) from None
+    for worker, theirs in found.items():
+        for package, ours in versions().items():
+            if theirs.get(package) != ours:
+                raise InputError(
+                    f"--cluster {address}: worker {worker} has {package} {theirs.get(package)}, "
+                    f"here it is {ours}; install the same"
+                )
+    mark = folder / f".{uuid4().hex}.tmp"
+    try:
+        mark.touch()
+        seen: dict[str, bool] = client.run(_sees, str(mark))
+    finally:
+        mark.unlink(missing_ok=True)
+    for worker, sees in seen.items():
+        if not sees:
+            raise InputError(
+                f"--cluster {address}: worker {worker} does not see {folder}; "
+                "choose a folder on a file system that all share"
+            )
+
+
+def _sees(mark: str) -> bool:
+    return Path(mark).is_file()
+
+
+def _draw(name: str, part: Part) -> Outcome:
+    """Draw one part; runs on a worker."""
+    from distributed import get_worker
+
+    return draw_part(getattr(get_worker(), name), part)
+
+
+def _result(future: Any, address: str) -> Outcome:
+    from distributed import KilledWorker
+
+    try:
+        outcome: Outcome = future.result()
+    except DmpError:
+        raise
+    except KilledWorker as error:
+        raise InstrumentError(
+            f"--cluster {address}: workers died again and again over one part ({error}); the same "
+            "command goes on from here: give them more memory, or take fewer --pairs-per-part"
+        ) from None
+    except OSError as error:
+        raise InstrumentError(f"--cluster {address}: was lost: {error}") from None
+    return outcome

@@ -1,0 +1,121 @@
+"""The folder of a batch: which parts are already there, what must go, and what comes last.
+
+A folder with a manifest is a finished batch. Parts stay when a run is stopped, and the next run
+with the same inputs and options goes on from them: each part's metadata say what it was made of.
+"""
+
+import contextlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dmpcli.batch.job import FACT, Job, Outcome, Part
+from dmpcli.errors import InputError
+from dmpcli.records import record, schemas, streams
+from dmpcli.records.record import Record
+
+
+class Folder:
+    """Where the parts of one batch go.
+
+    Parameters
+    ----------
+    job : Job
+        Its folder need not exist yet.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self.path = Path(job.folder)
+        self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
+
+    def open(self, parts: Iterable[Part], whole: bool) -> dict[int, Outcome]:
+        """Make room for these parts, and return the outcomes of those that are already there.
+
+        What a finished batch ends with goes first, so that nobody takes the folder for one.
+
+        Parameters
+        ----------
+        parts : iterable of Part
+        whole : bool
+            Whether these are all parts of the batch: then other parts are stale, and go.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        try:
+            self.path.mkdir(exist_ok=True)
+            (self.path / streams.MANIFEST).unlink(missing_ok=True)
+            (self.path / streams.TABLE).unlink(missing_ok=True)
+            kept, files = {}, set()
+            for part in parts:
+                files.add(part.file)
+                for stale in self.path.glob(f".{part.file}.*.tmp"):
+                    stale.unlink(missing_ok=True)
+                outcome = self._outcome(part)
+                if outcome is None:
+                    (self.path / part.file).unlink(missing_ok=True)
+                else:
+                    kept[part.number] = outcome
+            if whole:
+                self._clear(files)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
+        return kept
+
+    def _clear_temporaries(self) -> None:
+        for stale in self.path.glob(f".{streams.PART}.*.tmp"):
+            stale.unlink(missing_ok=True)
+
+    def _clear(self, files: set[str]) -> None:
+        self._clear_temporaries()
+        for other in self.path.glob(streams.PART):
+            if other.name not in files:
+                other.unlink()
+
+    def _outcome(self, part: Part) -> Outcome | None:
+        """Outcome of a part that is there, whole and of the same inputs; None otherwise."""
+        file = self.path / part.file
+        try:
+            footer = pq.read_metadata(file)
+            found = json.loads((footer.metadata or {})[record.KEY])
+            fact = found["facts"].pop(FACT)
+        except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None
+        if found != self._expected or fact.get("number") != part.number:
+            return None
+        return Outcome(
+            part.number,
+            {int(row): why for row, why in fact["failed"].items()},
+            {int(row): seconds for row, seconds in fact["clipped"].items()},
+            fact["unfolded"],
+            footer.num_rows,
+            file.stat().st_size,
+        )
+
+    def leave(self) -> None:
+        """Leave no folder behind that nothing was drawn into."""
+        with contextlib.suppress(OSError):
+            self.path.rmdir()
+
+    def finish(self, table: Record, manifest: dict[str, Any]) -> None:
+        """Write the table of pairs and, last of all, the manifest.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        # There is none where no pair could be drawn: its table says why.
+        with contextlib.suppress(OSError):
+            self.path.mkdir(exist_ok=True)
+        # A worker that died in the middle of a part has left its half.
+        self._clear_temporaries()
+        streams.write(self.path / streams.TABLE, record.encode(table))
+        text = json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
+        streams.write(self.path / streams.MANIFEST, text.encode())

@@ -1,0 +1,224 @@
+"""One batch from its table of pairs to its manifest."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats
+from dmpcli.batch.folder import Folder
+from dmpcli.batch.job import Job, Outcome, Part, file_of
+from dmpcli.batch.workers import Draw
+from dmpcli.errors import RefusedError
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.retiming import timing
+from dmpcli.records import manifest, trajectory
+from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.record import Record
+from dmpcli.surfaces.plane import Plane, pair_charts
+
+_AT_ONCE = 100_000
+"""Pairs whose charts are laid at once."""
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A share of the parts: every `count`-th, from the `index`-th on, counted from 1."""
+
+    index: int = 1
+    count: int = 1
+
+    def has(self, number: int) -> bool:
+        """Tell whether a part is of this share."""
+        return number % self.count == self.index - 1
+
+    @property
+    def whole(self) -> bool:
+        """Whether this is all of the batch."""
+        return self.count == 1
+
+
+@dataclass
+class Summary:
+    """What a run did.
+
+    Attributes
+    ----------
+    drawn, failed : int
+        Pairs with and without a stroke, of those that this run was to draw.
+    unfolded : int
+        Strokes that cross a sharp crease.
+    kept : int
+        Parts that an earlier run had drawn.
+    parts : int
+    """
+
+    drawn: int = 0
+    failed: int = 0
+    unfolded: int = 0
+    kept: int = 0
+    parts: int = 0
+
+
+@dataclass
+class Batch:
+    """A table of pairs, cut into parts.
+
+    Parameters
+    ----------
+    job : Job
+    table : PairTable
+        Pairs that cannot be drawn have their status; more get it here.
+    pairs : Pairs
+        Those of the table, on the surface.
+    duration : array, shape (B,)
+        Of each stroke without easing, s.
+    size : int
+        Pairs per part.
+    shard : Shard
+    """
+
+    job: Job
+    table: PairTable
+    pairs: Pairs
+    duration: Floats
+    size: int
+    shard: Shard = field(default_factory=Shard)
+
+    def __post_init__(self) -> None:
+        self._admitted = self.table.good
+        self._outcomes: dict[int, Outcome] = {}
+
+    def parts(self) -> Iterator[Part]:
+        """Yield the parts of this shard; part n holds rows n·size to (n+1)·size - 1."""
+        for number in range(-(-len(self.table) // self.size)):
+            first = number * self.size
+            rows = first + np.flatnonzero(self._admitted[first : first + self.size])
+            if self.shard.has(number) and len(rows):
+                ids = [self.table.ids[row] for row in rows]
+                yield Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+
+    @property
+    def count(self) -> int:
+        """How many pairs this shard is to draw."""
+        numbers = np.flatnonzero(self._admitted) // self.size
+        return int(np.sum(numbers % self.shard.count == self.shard.index - 1))
+
+    def run(self, draw: Draw, advance: Callable[[int], None]) -> Summary:
+        """Draw what is not there yet; with all parts there, write table and manifest.
+
+        Parameters
+        ----------
+        draw : callable
+            Of `dmpcli.batch.workers`.
+        advance : callable
+            Told how many pairs are done.
+
+        Returns
+        -------
+        Summary
+
+        Raises
+        ------
+        RefusedError
+            A pair cannot be drawn, and the job is to stop then. Finished parts stay.
+        InputError
+            The folder cannot be written.
+        """
+        folder = Folder(self.job)
+        kept = folder.open(self.parts(), self.shard.whole)
+        summary = Summary(kept=len(kept))
+        sizes = {part.number: len(part) for part in self.parts()}
+        try:
+            for outcome in self._all(kept, draw):
+                self._note(outcome, sizes[outcome.number], summary)
+                advance(sizes[outcome.number])
+        finally:
+            folder.leave()
+        if self.shard.whole:
+            folder.finish(self._table(), self._manifest(sizes))
+        return summary
+
+    def _all(self, kept: dict[int, Outcome], draw: Draw) -> Iterator[Outcome]:
+        yield from kept.values()
+        yield from draw(self.job, (part for part in self.parts() if part.number not in kept))
+
+    def _note(self, outcome: Outcome, size: int, summary: Summary) -> None:
+        self._outcomes[outcome.number] = outcome
+        for row, why in outcome.failed.items():
+            self.table.status[row] = f"{self.table.place(row)}, pair {self.table.ids[row]}: {why}"
+        if outcome.fatal:
+            first = self.table.status[min(outcome.failed)]
+            raise RefusedError(
+                f"{self.table.name}: {first}; move the pair, or give --on-error skip"
+            )
+        summary.parts += 1
+        summary.drawn += size - len(outcome.failed)
+        summary.failed += len(outcome.failed)
+        summary.unfolded += outcome.unfolded
+
+    def _table(self) -> Record:
+        """Return the table of pairs with what became of each."""
+        good = self.table.good
+        files = [""] * len(self.table)
+        for row in np.flatnonzero(good).tolist():
+            files[row] = file_of(row // self.size)
+        return trajectory.pairs_record(
+            self.table.ids,
+            self.pairs,
+            self._lasting(good),
+            self._normals(good),
+            files,
+            self.table.status,
+            self.job.provenance,
+        )
+
+    def _lasting(self, good: Booleans) -> Floats:
+        """Duration of each trajectory with easing, s; where there is none, as it was asked."""
+        skill, style = self.job.task.skill, self.job.task.style
+        lasting = self.duration.copy()
+        for seconds in np.unique(self.duration[good]).tolist():
+            when = timing(
+                seconds,
+                style.rate,
+                skill.duration,
+                skill.spring.tau,
+                style.ease_in,
+                style.ease_out,
+            )
+            lasting[good & (self.duration == seconds)] = when.t[-1]
+        for outcome in self._outcomes.values():
+            for row, seconds in outcome.clipped.items():
+                lasting[row] = seconds
+        return lasting
+
+    def _normals(self, good: Booleans) -> Floats:
+        """Unit normal of each pair's plane; NaN on a mesh, and where there is no stroke."""
+        task, frame = self.job.task, self.job.task.skill.frame
+        normal = np.full((len(self.table), 3), np.nan)
+        if isinstance(task.surface, Plane):
+            normal[good] = task.surface.normal
+        elif task.surface is None and task.skill.model == "original":
+            normal[good] = frame.normal
+        elif task.surface is None:
+            drawn = np.flatnonzero(good)
+            for first in range(0, len(drawn), _AT_ONCE):
+                rows = drawn[first : first + _AT_ONCE]
+                start, goal = self.pairs.start[rows], self.pairs.goal[rows]
+                normal[rows] = pair_charts(start, goal, frame.normal, task.skill.closed).normal
+        return normal
+
+    def _manifest(self, sizes: dict[int, int]) -> dict[str, Any]:
+        entries = [
+            manifest.Entry(
+                file=file_of(number),
+                pairs=sizes[number],
+                rows=self._outcomes[number].rows,
+                bytes=self._outcomes[number].size,
+            )
+            for number in sorted(sizes)
+            if self._outcomes[number].rows
+        ]
+        drawn = sum(status == OK for status in self.table.status)
+        return manifest.document(entries, len(self.table), drawn, self.job.provenance)

@@ -1,0 +1,140 @@
+"""What `generalize` reads besides the skill: one pair's ends, the surface, and the arm."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dmpcli.errors import InputError
+
+if TYPE_CHECKING:
+    from dmpcli.primitives.reach import Reach
+    from dmpcli.primitives.skill import Skill
+    from dmpcli.records.pairs import PairTable
+    from dmpcli.surfaces.protocol import Surface
+
+Point = tuple[float, float, float]
+
+ENDS = "--start and --goal"
+"""What messages call the table of the one pair of the command line."""
+
+
+def one_pair(
+    start: Point, goal: Point, start_orientation: Point | None, goal_orientation: Point | None
+) -> "PairTable":
+    """Return a table of one pair."""
+    import numpy as np
+
+    from dmpcli import rotations
+    from dmpcli.commands.options import within
+    from dmpcli.primitives.generalization import Pairs
+    from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
+
+    def rotation(name: str, angles: Point | None) -> Any:
+        if angles is None:
+            return None
+        within(name, angles, LARGEST_ANGLE)
+        return rotations.from_euler(np.array([angles]))
+
+    return PairTable(
+        ENDS,
+        ["1"],
+        Pairs(
+            np.array([start]),
+            np.array([goal]),
+            rotation("--start-orientation", start_orientation),
+            rotation("--goal-orientation", goal_orientation),
+        ),
+        None,
+        np.array([np.nan]),
+        [OK],
+    )
+
+
+def surface_at(
+    path: Path,
+    pose: str | None,
+    unit: str | None,
+    options: dict[str, Any],
+    inputs: list[dict[str, str]],
+    quiet: bool,
+) -> "Surface":
+    """Read the surface, place it in the base frame, and say what is odd about it."""
+    from dmpcli.commands.messages import tell
+    from dmpcli.records import mesh as mesh_file
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import streams, surface
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.plane import Plane
+
+    source = streams.read(path)
+    inputs.append({"role": "surface", "sha256": source.sha256})
+    placed = None
+    if pose is not None:
+        placed, pose_source = pose_file.parse(pose, "--surface-pose")
+        if pose_source is None:
+            options["surface_pose"] = [float(word) for word in pose.split()]
+        else:
+            inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
+    found = surface.load(source, unit, placed)
+    if isinstance(found, Plane):
+        return found
+    for remark in found.remarks:
+        tell(f"{path}: {remark}", quiet)
+    tell(f"{path}: {mesh_file.summary(found)}", quiet)
+    return Mesh(found.V, found.F)
+
+
+def facing_tool(
+    surface: "Surface", skill: "Skill", table: "PairTable", name: str, quiet: bool
+) -> "Surface":
+    """Turn a plane's normal to the tool's side, and say so where that flips it."""
+    from dmpcli.commands.messages import tell
+    from dmpcli.primitives.admission import tool_axis
+    from dmpcli.surfaces.plane import Plane
+
+    if not isinstance(surface, Plane):
+        return surface  # the charts of a mesh look for the tool's side at each start
+    facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
+    if facing.normal @ surface.normal < 0:
+        tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
+    return facing
+
+
+def reach_of(
+    model: str | None,
+    tool: Path | None,
+    oriented: bool,
+    options: dict[str, Any],
+    inputs: list[dict[str, str]],
+    quiet: bool,
+) -> "Reach | None":
+    """Return the arm that is to draw; None where none is named.
+
+    Raises
+    ------
+    InputError
+        The model is not known, the tool file is wrong, or there is a tool and no arm.
+    """
+    from dmpcli.commands.messages import tell
+    from dmpcli.kinematics import models
+    from dmpcli.primitives.reach import Reach
+    from dmpcli.records import streams
+    from dmpcli.records import tool as tool_file
+
+    if model is None:
+        if tool is not None:
+            raise InputError("--tool: says where the flange of --robot-model is; name one")
+        return None
+    arm = models.model(model)
+    options["robot_model"] = model
+    if not oriented:
+        tell(
+            "the strokes have no orientation: the arm is checked with the tool along the surface's "
+            "normal at the start",
+            quiet,
+        )
+    if tool is None:
+        tell("no --tool: the flange is taken as the TCP", quiet)
+        return Reach(arm)
+    source = streams.read(tool)
+    inputs.append({"role": "tool", "sha256": source.sha256})
+    return Reach(arm, tool_file.geometry(source))

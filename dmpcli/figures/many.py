@@ -1,0 +1,368 @@
+"""A batch measured part by part: some numbers of each stroke, and the few strokes to be drawn."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
+from dmpcli.errors import InputError
+from dmpcli.figures import measured
+from dmpcli.figures.footing import AT_ONCE, Ground, placed
+from dmpcli.figures.stroke import LEAST, Stroke, role_of
+from dmpcli.measures.many_deviations import Taught
+from dmpcli.measures.many_motions import many_motions
+from dmpcli.measures.many_waves import ManyWaves, many_waves
+from dmpcli.records import dataset, schemas
+from dmpcli.records.dataset import Batch, Piece
+from dmpcli.surfaces import plane
+
+FIGURES = (
+    *("wave_height", "wave_spread", "nearest_rms", "nearest_max", "phase_rms", "phase_max"),
+    *("length", "duration", "peak_speed", "ldlj", "sparc", "start_error", "goal_error"),
+    *(f"surface_{key}" for key in measured.ON_SURFACE),
+)
+"""Columns of `Measured.table`."""
+
+_SAMPLES = 1 << 16
+"""Samples worked on at once: what is in work stays in the processor's cache."""
+
+_MOST_WORKERS = 4
+
+
+@dataclass(frozen=True)
+class Some:
+    """Strokes that were measured together.
+
+    Attributes
+    ----------
+    rows : array of int, shape (k,)
+        Of the batch.
+    role : str
+    table : array, shape (k, len(FIGURES))
+        NaN where a figure does not exist.
+    t : array, shape (n,)
+        s, of all of them.
+    waves : ManyWaves
+    stroke : callable
+        One of them as it is drawn, by its place.
+    """
+
+    rows: Integers
+    role: str
+    table: Floats
+    t: Floats
+    waves: ManyWaves
+    stroke: Callable[[int], Stroke]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What strokes are measured against.
+
+    Attributes
+    ----------
+    reference : Stroke, optional
+        The demonstration.
+    ground : Ground, optional
+        The surface of the report.
+    normal : array, shape (3,), optional
+        Of a surface that is a plane.
+    """
+
+    reference: Stroke | None = None
+    ground: Ground | None = None
+    normal: Floats | None = None
+
+    @cached_property
+    def taught(self) -> Taught | None:
+        """The demonstration in its own chart."""
+        at = self.reference
+        if at is None or at.axes is None:
+            return None
+        return Taught(at.t, (at.position - at.start) @ at.axes)
+
+
+def measured_parts(
+    batch: Batch, label: str, sight: Sight, only: Integers | None = None
+) -> Iterator[Some]:
+    """Measure the strokes of a batch, in an order that follows its parts.
+
+    Parameters
+    ----------
+    batch : Batch
+    label : str
+        What to call it.
+    sight : Sight
+    only : array of int, optional
+        Only these rows of the batch.
+
+    Raises
+    ------
+    InputError
+        A part is damaged, is not the batch's, or holds a stroke that cannot be measured.
+    """
+    more = schemas.NORMAL if sight.ground is None else (*schemas.NORMAL, *schemas.EULER_ANGLES)
+    parts = None if only is None else np.unique(batch.part[only]).tolist()
+
+    def tasks() -> Iterator[Callable[[], Some]]:
+        for piece in dataset.pieces(batch, more, parts):
+            for which, t in _alike(piece):
+                if only is not None:
+                    which = which[np.isin(piece.rows[which], only)]
+                size = max(1, _SAMPLES // len(t))
+                size = size if sight.ground is None else min(size, AT_ONCE)
+                for first in range(0, len(which), size):
+                    some = which[first : first + size]
+                    yield partial(_measured, batch, piece, some, t, label, sight)
+
+    return _in_turn(tasks())
+
+
+def _measured(
+    batch: Batch, piece: Piece, which: Integers, t: Floats, label: str, sight: Sight
+) -> Some:
+    return _Block(batch, piece, which, t, label, sight).measured()
+
+
+def _in_turn(tasks: Iterator[Callable[[], Some]]) -> Iterator[Some]:
+    """Do tasks on several cores, few at a time; what they give comes in their order."""
+    workers = min(os.cpu_count() or 1, _MOST_WORKERS)
+    with ThreadPoolExecutor(workers) as pool:
+        begun: deque[Future[Some]] = deque()
+        try:
+            for task in tasks:
+                begun.append(pool.submit(task))
+                if len(begun) > 2 * workers:
+                    yield begun.popleft().result()
+            while begun:
+                yield begun.popleft().result()
+        finally:
+            for future in begun:
+                future.cancel()
+
+
+def _alike(piece: Piece) -> Iterator[tuple[Integers, Floats]]:
+    """Trajectories that share their times, by their places in the piece, and the times."""
+    t = piece.columns["t"]
+    counts = np.diff(piece.first)
+    for n in np.unique(counts).tolist():
+        which = np.flatnonzero(counts == n)
+        if n < LEAST:
+            raise InputError(
+                f"{piece.name}: a stroke of {n} samples cannot be measured; {LEAST} are needed"
+            )
+        times = _gathered(t, piece.first[which], n)
+        back = np.flatnonzero(~(times[:, 1:] > times[:, :-1]).all(axis=1))
+        if len(back):
+            one = times[back[0]]
+            row = int(piece.first[which[back[0]]] + np.argmax(one[1:] <= one[:-1])) + 2
+            raise InputError(
+                f"{piece.name}: column 't', row {row}: time does not increase; sort the rows"
+            )
+        if (times == times[0]).all():
+            yield which, times[0] - times[0, 0]
+            continue
+        groups: dict[bytes, list[int]] = {}
+        for i, one in enumerate(times):
+            groups.setdefault(one.tobytes(), []).append(i)
+        for some in groups.values():
+            yield which[some], times[some[0]] - times[some[0], 0]
+
+
+def _gathered(column: AnyArray, first: Integers, n: int) -> Floats:
+    """Samples of trajectories of n samples each, shape (k, n)."""
+    begin, end = int(first[0]), int(first[-1]) + n
+    if end - begin == len(first) * n:
+        return np.asarray(column[begin:end]).reshape(-1, n)
+    return np.asarray(column[first[:, None] + np.arange(n)])
+
+
+class _Block:
+    """Some trajectories of a piece that share their times.
+
+    Parameters
+    ----------
+    which : array of int, shape (k,)
+        Their places in the piece.
+    t : array, shape (n,)
+        s, from 0.
+    """
+
+    def __init__(
+        self, batch: Batch, piece: Piece, which: Integers, t: Floats, label: str, sight: Sight
+    ) -> None:
+        self.batch, self.piece, self.t, self.label, self.sight = batch, piece, t, label, sight
+        self.rows, self.first = piece.rows[which], piece.first[which]
+        self.facts = piece.facts
+        self.role = role_of(piece.facts)
+        self.position = self._three(schemas.POSITION)
+        ends = batch.start, batch.goal
+        self.intended = ends[0] is not None and ends[1] is not None
+        self.start = self.position[..., 0].T if ends[0] is None else ends[0][self.rows]
+        self.goal = self.position[..., -1].T if ends[1] is None else ends[1][self.rows]
+        self.length = np.linalg.norm(self.goal - self.start, axis=1)
+        self.closed = self._closed()
+        self.known, self.axes = self._axes()
+
+    def _three(self, names: Sequence[str]) -> Floats:
+        n = len(self.t)
+        return np.stack([_gathered(self.piece.columns[c], self.first, n) for c in names])
+
+    def _closed(self) -> Booleans:
+        if "closed" in self.facts:
+            said: Booleans = np.full(len(self.rows), bool(self.facts["closed"]))
+        else:
+            said = np.array([plane.is_closed(path.T) for path in self.position.swapaxes(0, 1)])
+        return np.asarray(said | (self.length == 0.0))
+
+    def _axes(self) -> tuple[Booleans, Floats]:
+        """Which strokes have a plane, shape (k,), and its chart axes, shape (k, 3, 3)."""
+        count = len(self.rows)
+        normal = np.full((count, 3), np.nan)
+        if self.batch.normal is not None:
+            normal = self.batch.normal[self.rows].copy()
+        unknown = ~np.isfinite(normal).all(axis=1)
+        if self.facts.get("normal") is not None:
+            normal[unknown] = self.facts["normal"]
+        elif unknown.any() and self.piece.has(*schemas.NORMAL):
+            turning = self._three(schemas.NORMAL)
+            level = unknown & (np.ptp(turning, axis=2).max(axis=0) < 1e-6)
+            normal[level] = turning[:, level, 0].T
+        unknown = ~np.isfinite(normal).all(axis=1)
+        if self.sight.normal is not None:
+            away = ~unknown & (normal @ self.sight.normal < 0.0)
+            normal = np.where(away[:, None], -self.sight.normal, self.sight.normal)
+            unknown[:] = False
+        axes = np.full((count, 3, 3), np.nan)
+        if unknown.any() and not self.piece.has(*schemas.NORMAL):
+            for i in np.flatnonzero(unknown):
+                axes[i] = plane.stroke_axes(self.position[:, i].T)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        line = ~unknown & ~self.closed
+        e_u = (self.goal[line] - self.start[line]) / self.length[line, None]
+        axes[line] = plane.open_axes(e_u, normal[line])
+        for i in np.flatnonzero(~unknown & self.closed):
+            axes[i] = plane.closed_axes(normal[i])
+        return np.isfinite(axes[:, 0, 0]), axes
+
+    def measured(self) -> Some:
+        """Measure the strokes."""
+        table = np.full((len(self.rows), len(FIGURES)), np.nan)
+        column = {name: table[:, i] for i, name in enumerate(FIGURES)}
+        gap = self.position - self.start.T[:, :, None]
+        place = np.einsum("bji,jbn->ibn", self.axes, gap)
+        motions = many_motions(self.t, self.position, self.start, self.goal)
+        for name in ("length", "peak_speed", "ldlj", "sparc"):
+            column[name][:] = getattr(motions, name)
+        if self.intended:
+            column["start_error"][:] = motions.start_error
+            column["goal_error"][:] = motions.goal_error
+        column["duration"][:] = self.t[-1]
+        flat = np.where(self.known[:, None], place[1], 0.0)
+        waves = many_waves(flat, self.length, self.closed)
+        column["wave_height"][:], column["wave_spread"][:] = waves.mean, waves.spread
+        self._compare(column, self.known, place[:, self.known], self._stretch())
+        if self.sight.ground is None:
+            return Some(self.rows, self.role, table, self.t, waves, self._stroke)
+        strokes = placed(
+            [self._stroke(i) for i in range(len(self.rows))],
+            self.sight.ground,
+            self.sight.reference,
+        )
+        self._place(column, strokes)
+        waves = ManyWaves.joined([stroke.wave for stroke in strokes])
+        return Some(self.rows, self.role, table, self.t, waves, strokes.__getitem__)
+
+    def _stretch(self) -> Floats:
+        """Start-goal distances of the strokes with a plane over the demonstration's."""
+        at = self.sight.reference
+        if at is None or at.closed:
+            return np.ones(int(self.known.sum()))
+        return np.asarray(np.where(self.closed, 1.0, self.length / at.length)[self.known])
+
+    def _compare(
+        self, column: dict[str, Floats], which: Booleans, place: Floats, stretch: Floats
+    ) -> None:
+        """Fill in how far some of the strokes lie from the demonstration."""
+        taught = self.sight.taught
+        if taught is None or not which.any():
+            return
+        found = taught.deviations(self.t, place, stretch)
+        for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
+            column[name][which] = getattr(found, name)
+
+    def _place(self, column: dict[str, Floats], strokes: Sequence[Stroke]) -> None:
+        """Fill in how the strokes lie on the surface; on a curved one they are compared there."""
+        for i, stroke in enumerate(strokes):
+            row = measured.on_surface(stroke) or {}
+            for key in measured.ON_SURFACE:
+                value = row.get(key)
+                column[f"surface_{key}"][i] = np.nan if value is None else value
+            mean, spread = stroke.wave.mean, stroke.wave.spread
+            column["wave_height"][i] = np.nan if mean is None else mean
+            column["wave_spread"][i] = np.nan if spread is None else spread
+        curved = np.array([stroke.axes is None for stroke in strokes])
+        if not curved.any() or self.sight.reference is None:
+            return
+        for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
+            column[name][curved] = np.nan
+        feet = [(s.footing.place, s.footing.length) if s.footing else (None, None) for s in strokes]
+        charted = np.array(
+            [
+                bool(c) and p is not None and not self.sight.reference.closed
+                for c, (p, _) in zip(curved, feet, strict=True)
+            ]
+        )
+        if not charted.any():
+            return
+        place = np.stack([p.T for p, _ in _picked(feet, charted)], axis=1)
+        lengths = np.array([length for _, length in _picked(feet, charted)])
+        self._compare(column, charted, place, lengths / self.sight.reference.length)
+
+    def _stroke(self, i: int) -> Stroke:
+        """Return one of the strokes as it is drawn."""
+        row, position = int(self.rows[i]), self.position[:, i].T.copy()
+        n = len(self.t)
+        columns = self.piece.columns
+        at = slice(int(self.first[i]), int(self.first[i]) + n)
+        rotation = None
+        if self.piece.has(*schemas.EULER_ANGLES):
+            angles = np.column_stack([columns[c][at] for c in schemas.EULER_ANGLES])
+            rotation = rotations.from_euler(angles)
+        side = None
+        if self.batch.normal is not None and np.isfinite(self.batch.normal[row]).all():
+            side = self.batch.normal[row]
+        elif self.facts.get("normal") is not None:
+            side = np.asarray(self.facts["normal"], dtype=float)
+        elif self.piece.has(*schemas.NORMAL):
+            side = np.array([columns[c][at.start] for c in schemas.NORMAL])
+        elif rotation is not None:
+            side = -rotation[0, :, 2]
+        return Stroke(
+            f"{self.label}[{self.batch.ids[row].as_py()}]",
+            schemas.TRAJECTORY.name,
+            self.role,
+            self.t,
+            position,
+            position,
+            self.start[i],
+            self.goal[i],
+            self.axes[i] if self.known[i] else None,
+            bool(self.closed[i]),
+            self.intended,
+            bool(self.facts.get("simulated", False)),
+            rotation=rotation,
+            side=side,
+            bound=self.facts.get("model") != "original",
+        )
+
+
+def _picked(values: Sequence[Any], which: Booleans) -> list[Any]:
+    return [value for value, chosen in zip(values, which, strict=True) if chosen]

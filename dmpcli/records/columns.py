@@ -1,0 +1,87 @@
+"""Columns of a pyarrow table as arrays, checked."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from dmpcli.arrays import AnyArray, Booleans
+from dmpcli.errors import InputError
+from dmpcli.records.schemas import Column
+
+TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
+"""Arrow's types of the columns that a schema names."""
+
+
+def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:
+    """Return the wanted columns of a pyarrow table as arrays, checked.
+
+    Raises
+    ------
+    InputError
+        A required column is missing, empty or null somewhere, or a value is not a finite number.
+    """
+    columns: dict[str, AnyArray] = {}
+    for key, column in wanted.items():
+        if key not in table.column_names:
+            if column.required:
+                raise InputError(
+                    f"{name}: column {key!r} is missing; it has {', '.join(table.column_names)}"
+                )
+            continue
+        columns[key] = _array(table.column(key), key, column, name)
+    if table.num_rows == 0:
+        raise InputError(f"{name}: holds no rows")
+    return columns
+
+
+def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
+    try:
+        values = chunked.cast(TYPES[column.type]).combine_chunks()
+    except pa.ArrowException:
+        raise InputError(
+            f"{name}: column {key!r} holds {chunked.type}, numbers are needed"
+            if column.type != "string"
+            else f"{name}: column {key!r} holds {chunked.type}, text is needed"
+        ) from None
+    unknown = nulls(values)
+    if column.required and unknown.any():
+        raise InputError(
+            f"{name}: column {key!r}, row {int(np.argmax(unknown)) + 1}: no value; "
+            "remove the row or fill it in"
+        )
+    if column.type == "string":
+        return np.asarray(values.to_pylist(), dtype=object)
+    array = numbers(values)
+    if column.type == "int64":
+        array[unknown] = -1
+        return array
+    array[unknown] = np.nan
+    bad = ~np.isfinite(array) & ~unknown
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(
+            f"{name}: column {key!r}, row {row + 1}: {array[row]} is not a finite number; "
+            "remove the row or mend it"
+        )
+    return array
+
+
+def nulls(values: Any) -> Booleans:
+    """Tell which values of a pyarrow array are null, shape (rows,)."""
+    if values.null_count == 0:
+        return np.zeros(len(values), dtype=bool)
+    bits = np.frombuffer(values.buffers()[0], dtype=np.uint8)
+    known = np.unpackbits(bits, bitorder="little")[values.offset : values.offset + len(values)]
+    unknown: Booleans = known == 0
+    return unknown
+
+
+def numbers(values: Any) -> AnyArray:
+    """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
+    dtype = values.type.to_pandas_dtype()
+    if len(values) == 0:
+        return np.empty(0, dtype=dtype)
+    whole = np.frombuffer(values.buffers()[1], dtype=dtype)
+    return whole[values.offset : values.offset + len(values)].copy()

@@ -1,0 +1,74 @@
+"""The manifest of a batch: written last, so that a folder with one is a finished batch."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from dmpcli.records import documents
+from dmpcli.records.documents import Part
+from dmpcli.records.record import Provenance
+from dmpcli.records.streams import Source
+
+SCHEMA = "manifest"
+VERSION = 1
+
+
+class Entry(Part):
+    """One part of the batch."""
+
+    file: str
+    pairs: Annotated[int, Field(ge=1, description="of the table that were to be drawn")]
+    rows: Annotated[int, Field(ge=1)]
+    bytes: Annotated[int, Field(ge=1)]
+
+
+class Input(Part):
+    """One input of the batch."""
+
+    role: str
+    sha256: str
+
+
+class Manifest(Part):
+    """A finished batch."""
+
+    schema_name: Annotated[Literal["manifest"], Field(alias="schema")] = "manifest"
+    version: Annotated[int, Field(ge=1)] = VERSION
+    tool: str
+    options: dict[str, Any]
+    inputs: list[Input]
+    pairs: Annotated[int, Field(ge=1, description="rows of the table")]
+    drawn: Annotated[int, Field(ge=0, description="pairs that have a trajectory")]
+    parts: list[Entry]
+
+
+def document(
+    parts: Sequence[Entry], pairs: int, drawn: int, provenance: Provenance
+) -> dict[str, Any]:
+    """Return the manifest of a batch as it stands in its file."""
+    found = Manifest(
+        tool=provenance.tool,
+        options=provenance.options,
+        inputs=[Input(**entry) for entry in provenance.inputs],
+        pairs=pairs,
+        drawn=drawn,
+        parts=list(parts),
+    )
+    return found.model_dump(mode="json", by_alias=True)
+
+
+def decode(source: Source) -> Manifest:
+    """Read a manifest.
+
+    Raises
+    ------
+    InputError
+        Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
+    """
+    return documents.validated(source, Manifest, SCHEMA, VERSION, "draw the batch again")
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of manifests."""
+    return documents.json_schema(Manifest, SCHEMA)
