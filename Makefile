@@ -4,6 +4,9 @@
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
 #   make bench       the timings that the README quotes
+#   make peers       the same beside other packages, in an environment of their own
+#   make soak        200 recordings killed at random: what is lost
+#   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first.
 
@@ -14,7 +17,7 @@ OUT    := out
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test lint bench samples pictures schemas clean
+.PHONY: help demo reproduce test lint bench peers soak cluster-demo samples pictures schemas clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -46,6 +49,32 @@ bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
+	$(BIN)/python -m benchmarks.lateness
+	$(BIN)/python -m benchmarks.batches $(OUT)/batches
+
+soak: .venv/installed
+	$(BIN)/python -m benchmarks.soak
+
+# Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
+
+PEERS := $(OUT)/peers
+
+$(PEERS)/installed: benchmarks/peers/requirements.txt
+	$(PYTHON) -m venv $(PEERS)/venv
+	$(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< || \
+	    $(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< \
+	        --extra-index-url https://download.pytorch.org/whl/cpu
+	touch $@
+
+peers: $(PEERS)/installed
+	$(PEERS)/venv/bin/python -W ignore -m benchmarks.peers > $(PEERS)/peers.md
+	cp $(PEERS)/peers.md docs/peers.md
+	@cat docs/peers.md
+
+# A batch on two workers, one of which is killed on the way.
+
+cluster-demo: .venv/installed
+	$(BIN)/python benchmarks/cluster_demo.py $(OUT)/cluster
 
 # One stroke through the whole tool-chain, against the mock lab.
 
@@ -146,7 +175,6 @@ pictures: reproduce
 
 samples: .venv/installed
 	$(BIN)/python sample_runs/make_reference.py sample_runs/reference.parquet
-	$(BIN)/python sample_runs/make_surfaces.py sample_runs
 	$(BIN)/python sample_runs/make_surfaces.py sample_runs
 	$(DMPCLI) record -o sample_runs/recorded.parquet --config sample_runs/recorded.toml --seed 1
 

@@ -9,7 +9,19 @@ import typer
 from typer.core import TyperGroup
 
 from dmpcli import __version__
-from dmpcli.commands import execute, fit, generalize, inspect, record, register, report
+from dmpcli.commands import (
+    calibrate,
+    execute,
+    fit,
+    generalize,
+    inspect,
+    record,
+    recover,
+    register,
+    report,
+    simulate,
+    touch,
+)
 from dmpcli.commands.pose_words import joined
 from dmpcli.errors import DmpError
 
@@ -47,7 +59,11 @@ app.command("generalize")(generalize.command)
 app.command("execute")(execute.command)
 app.command("report")(report.command)
 app.command("inspect")(inspect.command)
+app.command("recover")(recover.command)
 app.command("register")(register.command)
+app.command("simulate")(simulate.command)
+app.command("calibrate")(calibrate.command)
+app.command("touch")(touch.command)
 
 
 def _version(asked: bool) -> None:

@@ -186,21 +186,6 @@ def test_a_closed_standard_input_is_one_line(tmp_path):
     assert done.stderr.decode() == "dmpcli: standard input: is closed; name a file\n"
 
 
-def test_sigterm_during_a_batch_leaves_the_older_one_whole(dmpcli, tmp_path):
-    dmpcli("fit", REFERENCE, "-o", "skill.json")
-    rows = [f"0,0,0,100,{i % 9},0" for i in range(30_000)]
-    (tmp_path / "few.csv").write_text("\n".join(["x0,y0,z0,xg,yg,zg", *rows[:3]]))
-    (tmp_path / "many.csv").write_text("\n".join(["x0,y0,z0,xg,yg,zg", *rows]))
-    dmpcli("generalize", "skill.json", "-o", "batch", "--pairs", "few.csv")
-    before = {p.name: p.read_bytes() for p in (tmp_path / "batch").iterdir()}
-    arguments = "generalize skill.json -o batch --pairs many.csv"
-    done = shell(f"timeout -s TERM 3 {DMPCLI} {arguments}", tmp_path)
-    assert done.returncode == 124  # as timeout says it
-    assert {p.name: p.read_bytes() for p in (tmp_path / "batch").iterdir()} == before
-    names = {p.name for p in tmp_path.iterdir()}
-    assert names == {"skill.json", "few.csv", "many.csv", "batch"}
-
-
 def test_a_skill_that_is_not_the_stroke_is_said_so_even_when_quiet(dmpcli):
     said = dmpcli("fit", REFERENCE, "-o", "s.json", "--cutoff", "0.02", "-q").stderr.decode()
     assert "smoothing took off much of the stroke" in said
