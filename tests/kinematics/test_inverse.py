@@ -110,8 +110,10 @@ def test_the_scalar_way_finds_what_the_array_way_finds(q):
     if measure.min() < 1e-6 or abs(q[2]) > np.radians(160):
         return
     one = inverse.nearest(EC66, position, rotation, reference)
-    assert np.nanmin(turned(found, one)) < 1e-8
-    assert np.linalg.norm(one - reference) <= np.linalg.norm(q - reference) + 1e-8
+    # Near a singularity the angles are worth less: an error of the pose is divided by its measure.
+    slack = 1e-8 + 1e-11 / measure.min()
+    assert np.nanmin(turned(found, one)) < slack
+    assert np.linalg.norm(one - reference) <= np.linalg.norm(q - reference) + slack
 
 
 @settings(deadline=None, max_examples=100)
