@@ -103,7 +103,7 @@ def execution(period: float, duration: float, folder: Path, robot: str, sensor: 
     arm = Arm(servo, servo.open(), clock)
     plan = planning.make(stroke, period, 1.0, settings.limits, (stroke.position[0], PEN_DOWN), 20.0)
     watch = session.Watch(100.0, 1.0, 1e3, 1e3)
-    touch = session.touch(bench.sensor, PEN, plan, settings, clock, None)
+    touch = session.touch(bench.sensor, PEN, plan, settings, arm, None)
     loop = Loop(plan, settings.limits, watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))
