@@ -7,13 +7,13 @@ import sys
 import time
 from pathlib import Path
 
+import distributed
 import pytest
 
 from dmpcli.batch import cluster
 from dmpcli.errors import InputError, InstrumentError
 from tests.batch.test_run import DMPCLI, content, learned, write_pairs
 
-distributed = pytest.importorskip("distributed")
 BIN = Path(sys.executable).parent
 
 __all__ = ["learned"]
