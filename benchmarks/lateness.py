@@ -4,7 +4,9 @@
 
 For each rate and each command six blocks take turns: the bare loop (absolute deadlines, sleep, read
 the clock, no work) and ours (everything, the journal too). Pooled over its three blocks our p99 may
-be at most twice the bare loop's and 0.5 ms more; the median work of a cycle at most 1 ms.
+be at most twice the bare loop's and 0.5 ms more. Our own work in a cycle may take 1 ms (median):
+all that the loop's thread computes, the mock's physics with it. Over the wire (`--robot`,
+`--sensor`) it takes longer from waking to sleep, as the controller's answer is waited for.
 """
 
 import argparse
@@ -12,6 +14,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -39,6 +42,31 @@ BLOCKS = 3
 ROBOT = "mock:?lag=0.4"
 
 
+class Metered(MonotonicClock):
+    """The real clock; it meters what the thread that sleeps on it computes in between.
+
+    Attributes
+    ----------
+    computed : list of float
+        From each waking to the next sleep, s of processor time.
+    """
+
+    def __init__(self) -> None:
+        self.computed: list[float] = []
+        self._woke: float | None = None
+
+    def sleep_until(self, t: float) -> None:
+        """Sleep."""
+        if self._woke is not None:
+            self.computed.append(time.thread_time() - self._woke)
+        super().sleep_until(t)
+        self._woke = time.thread_time()
+
+
+Measured: TypeAlias = tuple[Pace, list[float]]
+"""When cycles woke, sent and ended, and what each computed, s of processor time."""
+
+
 def bare(period: float, duration: float) -> tuple[Floats, int]:
     """Return the lateness of each cycle of a loop that does nothing, s, and its missed periods."""
     late, missed, number = [], 0, 0
@@ -55,7 +83,7 @@ def bare(period: float, duration: float) -> tuple[Floats, int]:
     return np.array(late), missed
 
 
-def recording(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Pace:
+def recording(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Measured:
     """Run the loop of `record` on the real clock, with watchdog and journal."""
     given = {
         "control_rate": 1.0 / period,
@@ -65,7 +93,7 @@ def recording(period: float, duration: float, folder: Path, robot: str, sensor: 
         "following_angle": 1.0,
     }
     settings = layers.resolve(RecordSettings, "record", given, "drag")
-    stroke, clock = references.build(settings), MonotonicClock()
+    stroke, clock = references.build(settings), Metered()
     bench = urls.connect(robot, sensor, clock, scene=rehearsal.scene(stroke, settings))
     tutored = rehearsal.rehearse(bench.lab, stroke, settings)
     recorder = Recorder(
@@ -85,10 +113,10 @@ def recording(period: float, duration: float, folder: Path, robot: str, sensor: 
     journal.discard()
     if ending.failure is not None:
         print(f"  ended early: {ending.reason}")
-    return recorder.pace
+    return recorder.pace, clock.computed
 
 
-def execution(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Pace:
+def execution(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Measured:
     """Run the loop of `execute` on the real clock, with sensor, watchdog and journal."""
     settings = layers.resolve(ExecuteSettings, "execute", {"period": period}, None)
     t = np.arange(round(duration * 100.0) + 1) / 100.0
@@ -96,7 +124,7 @@ def execution(period: float, duration: float, folder: Path, robot: str, sensor: 
     u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     wave = np.column_stack([-109.0 * u, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
     stroke = planning.Stroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
-    clock = MonotonicClock()
+    clock = Metered()
     scene = session.scene(stroke, presses=False)
     bench = urls.connect(robot, sensor, clock, scene=scene)
     servo = watched(bench.robot)
@@ -114,7 +142,7 @@ def execution(period: float, duration: float, folder: Path, robot: str, sensor: 
         print(f"  ended early: {outcome.reason}")
     servo.close()
     bench.sensor.close()
-    return loop.pace
+    return loop.pace, clock.computed
 
 
 def _line(name: str, late: Floats, missed: int, more: str = "") -> None:
@@ -139,31 +167,36 @@ def main() -> int:
             for command, ours in (("record", recording), ("execute", execution)):
                 print(f"{command} at {rate:g} Hz, {2 * BLOCKS} blocks of {given.block:g} s")
                 empty: list[tuple[Floats, int]] = []
-                paces: list[Pace] = []
+                runs: list[Measured] = []
                 for _ in range(BLOCKS):
                     empty.append(bare(1.0 / rate, given.block))
-                    paces.append(
+                    runs.append(
                         ours(1.0 / rate, given.block, Path(name), given.robot, given.sensor)
                     )
-                passed &= _judge(empty, paces)
+                passed &= _judge(empty, runs)
     print("passed" if passed else "failed")
     return 0 if passed else 1
 
 
-def _judge(empty: list[tuple[Floats, int]], paces: list[Pace]) -> bool:
+def _judge(empty: list[tuple[Floats, int]], runs: list[Measured]) -> bool:
     idle = np.concatenate([late for late, _ in empty])
     wake, sent, work = (
-        np.concatenate([np.array(getattr(pace, name)) for pace in paces])
+        np.concatenate([np.array(getattr(pace, name)) for pace, _ in runs])
         for name in ("wake", "lateness", "work")
     )
-    missed = sum(pace.missed for pace in paces)
+    computed = float(np.median(np.concatenate([np.array(times) for _, times in runs])))
+    missed = sum(pace.missed for pace, _ in runs)
     _line("bare", idle, sum(count for _, count in empty))
     _line("ours, woke", wake, missed)
-    _line("ours, sent", sent, missed, f"   work p50 {1e3 * np.median(work):.3f} ms")
+    _line("ours, sent", sent, missed)
     bound = 2.0 * np.quantile(idle, 0.99) + 5e-4
-    fine = bool(np.quantile(wake, 0.99) <= bound and np.median(work) <= 1e-3)
-    print(f"  woke: p99 at most {1e3 * bound:.3f} ms, work at most 1 ms: {'yes' if fine else 'NO'}")
-    return fine
+    punctual, quick = bool(np.quantile(wake, 0.99) <= bound), computed <= 1e-3
+    print(
+        f"  p99 of the waking, at most {1e3 * bound:.3f} ms: {'yes' if punctual else 'NO'}\n"
+        f"  computed in a cycle {1e3 * computed:.3f} ms (median), at most 1 ms: "
+        f"{'yes' if quick else 'NO'}; from waking to sleep {1e3 * np.median(work):.3f} ms"
+    )
+    return punctual and quick
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.instruments import guards
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo
 from dmpcli.primitives.compensation import rest_zero
 from dmpcli.primitives.identification import LEVER
@@ -157,7 +158,7 @@ class Sensing:
                 f"force sensor: sample {sample.seq} is saturated or flagged as faulty, stopped; "
                 "use less force, or check range and cable"
             )
-        if not np.isfinite(sample.wrench).all():
+        if not guards.finite(sample.wrench):
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is not a number, stopped; check its driver"
             )

@@ -11,6 +11,7 @@ spring acts on ``Log(R R0ᵀ)``. Euler angles in the place of x would turn a too
 (rx = π) the wrong way about base y and z, and run away.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -219,7 +220,7 @@ def brake(law: Law, pose: Pose, bounds: Bounds) -> Pose:
 
 def _within(vector: Floats, bound: float, turning_bound: float) -> Floats:
     """Shorten both halves of a vector to their bounds; the directions stay."""
-    length, turning = np.sqrt(vector[:3] @ vector[:3]), np.sqrt(vector[3:] @ vector[3:])
+    length, turning = math.sqrt(vector[:3] @ vector[:3]), math.sqrt(vector[3:] @ vector[3:])
     if length <= bound and turning <= turning_bound:
         return vector
     return np.concatenate(

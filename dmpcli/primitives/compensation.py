@@ -4,6 +4,8 @@ Zero offset, tool weight, centre of mass and inclination come off; the rest is m
 into base axes; then a low-pass at the sensor's rate and a continuous dead-band.
 """
 
+import math
+
 import numpy as np
 
 from dmpcli.arrays import Floats
@@ -112,7 +114,7 @@ def dead_band(value: Floats, force: float, torque: float) -> Floats:
     out = np.zeros(6)
     for half, width in ((slice(0, 3), force), (slice(3, 6), torque)):
         part = value[half]
-        length = float(np.sqrt(part @ part))
+        length = math.sqrt(part @ part)
         if length > width:
             out[half] = part * (1.0 - width / length)
     return out

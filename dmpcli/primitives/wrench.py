@@ -141,8 +141,8 @@ def of_weight(R: Floats, load: Floats, centre: Floats) -> Floats:
     array, shape (..., 6)
         Sensor axes, about the sensor's origin.
     """
-    force = np.matvec(np.swapaxes(R, -1, -2), load)
-    return np.concatenate([force, np.matvec(skew(centre) / METRE, force)], axis=-1)
+    force = np.vecmat(load, R)
+    return np.concatenate([force, _torque(centre, force)], axis=-1)
 
 
 def to_tcp(wrench: Floats, R: Floats, lever: Floats) -> Floats:
@@ -165,7 +165,7 @@ def to_tcp(wrench: Floats, R: Floats, lever: Floats) -> Floats:
         Base axes, about the TCP.
     """
     force, torque = wrench[..., :3], wrench[..., 3:]
-    torque = torque - np.matvec(skew(lever) / METRE, force)
+    torque = torque - _torque(lever, force)
     return np.concatenate([np.matvec(R, force), np.matvec(R, torque)], axis=-1)
 
 
@@ -186,6 +186,17 @@ def to_sensor(wrench: Floats, R: Floats, lever: Floats) -> Floats:
     array, shape (..., 6)
         Sensor axes, about the sensor's origin.
     """
-    back = np.swapaxes(R, -1, -2)
-    force, torque = np.matvec(back, wrench[..., :3]), np.matvec(back, wrench[..., 3:])
-    return np.concatenate([force, torque + np.matvec(skew(lever) / METRE, force)], axis=-1)
+    force, torque = np.vecmat(wrench[..., :3], R), np.vecmat(wrench[..., 3:], R)
+    return np.concatenate([force, torque + _torque(lever, force)], axis=-1)
+
+
+def _torque(lever: Floats, force: Floats) -> Floats:
+    """``r × F`` in N·m, of a lever in mm, shape (3,), and forces, shape (..., 3)."""
+    torque: Floats
+    if force.ndim > 1:
+        torque = np.matvec(skew(lever) / METRE, force)
+        return torque
+    # In plain floats: several times faster, for control loops.
+    (x, y, z), (u, v, w) = lever.tolist(), force.tolist()
+    torque = np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+    return torque / METRE

@@ -1,5 +1,8 @@
 """How the simulated arm moves: behind servo set-points, or dragged by its own teaching mode."""
 
+import math
+from functools import cached_property
+
 import numpy as np
 
 from dmpcli.arrays import Floats
@@ -16,8 +19,6 @@ class ServoArm:
 
     Attributes
     ----------
-    position, rotation : array, shape (3,) and (3, 3)
-        Actual TCP, mm.
     velocity : array, shape (6,)
         Actual, mm/s and rad/s, base axes.
     """
@@ -25,18 +26,27 @@ class ServoArm:
     def __init__(self, position: Floats, rotation: Floats, servo: Servo) -> None:
         self._servo = servo
         self._period = 0.0
-        self.position = position.copy()
-        self.rotation = rotation.copy()
+        self._command, self._attitude = position.copy(), rotation.copy()
+        self._error = np.zeros(6)
         self.stand_still()
+
+    @property
+    def position(self) -> Floats:
+        """Actual TCP, shape (3,), mm."""
+        return self._command - self._error[:3]
+
+    @cached_property
+    def rotation(self) -> Floats:
+        """Actual, shape (3, 3); between two events it is read several times, or never."""
+        return exp_one(-self._error[3:]) @ self._attitude
 
     def stand_still(self) -> None:
         """Hold the actual pose from now on."""
-        self.velocity = np.zeros(6)
-        self._command, self._attitude = self.position.copy(), self.rotation.copy()
+        self._command, self._attitude = self.position, self.rotation
         self._target, self._target_attitude = self._command, self._attitude
-        self._error = np.zeros(6)
         self._rate = np.zeros(6)
         self._left = 0.0
+        self._settle(np.zeros(6), np.zeros(6))
 
     def start(self, period: float) -> None:
         """Take one set-point every `period` s from now on."""
@@ -71,14 +81,18 @@ class ServoArm:
             self._follow(dt, np.zeros(6))
 
     def _follow(self, dt: float, rate: Floats) -> None:
-        """Solve ``e' = rate - e / lag`` over `dt` and read the pose off the command."""
+        """Solve ``e' = rate - e / lag`` over `dt`."""
         lag = self._servo.lag
-        settled = lag * rate
-        decay = np.exp(-dt / lag) if lag > 0.0 else 0.0
-        self._error = settled + decay * (self._error - settled)
-        self.velocity = self._error / lag if lag > 0.0 else rate
-        self.position = self._command - self._error[:3]
-        self.rotation = exp_one(-self._error[3:]) @ self._attitude
+        if lag > 0.0:
+            settled = lag * rate
+            error = settled + math.exp(-dt / lag) * (self._error - settled)
+            self._settle(error, error / lag)
+        else:
+            self._settle(np.zeros(6), rate)
+
+    def _settle(self, error: Floats, velocity: Floats) -> None:
+        self._error, self.velocity = error, velocity
+        self.__dict__.pop("rotation", None)
 
 
 class DraggedArm:

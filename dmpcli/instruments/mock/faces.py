@@ -1,9 +1,8 @@
 """The mock lab behind the two protocols that real instruments obey."""
 
-import numpy as np
-
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError
+from dmpcli.instruments import guards
 from dmpcli.instruments.mock.arms import DraggedArm
 from dmpcli.instruments.mock.lab import Lab
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo, ServoInfo
@@ -120,7 +119,7 @@ class MockServo:
             return False
         if lab.mode != "ready" or lab.refuses:
             return False
-        if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+        if not guards.finite(position, rotation):
             return False
         lab.arm.send(position, rotation)
         return True

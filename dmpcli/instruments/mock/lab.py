@@ -70,7 +70,7 @@ class Lab:
 
     def take_samples(self) -> list[Sample]:
         """Hand out what the sensor has sent since the last call."""
-        self.advance()
+        self._tick_on(self.clock.now())
         taken, self._samples = self._samples, []
         return taken
 
@@ -82,14 +82,17 @@ class Lab:
     def advance(self) -> None:
         """Bring the lab up to the clock."""
         now = self.clock.now()
-        if now <= self._now:
-            return
+        if now > self._now:
+            self._tick_on(now)
+            self._move(now)
+
+    def _tick_on(self, now: float) -> None:
+        """Go on to the last tick of the grid until now."""
         while (tick := self._tick + (self._ticks + 1) * self._step) <= now + _EPS:
             self._move(tick)
             self._ticks += 1
             if self._streaming or isinstance(self.arm, DraggedArm):
                 self._feel(tick)
-        self._move(now)
 
     def _move(self, t: float) -> None:
         estop = self._opened + self.scene.faults.estop_at
@@ -119,5 +122,6 @@ class Lab:
             return
         sensed = self._wrist.sensed(force, self.arm.rotation, t - self._opened, noise)
         limit = self.scene.sensor.limit
-        healthy = bool(np.all(np.abs(sensed) < limit))
-        self._samples.append(Sample(t, self._seq, np.clip(sensed, -limit, limit), healthy, 0))
+        healthy = bool((np.abs(sensed) < limit).all())
+        shown = sensed if healthy else np.clip(sensed, -limit, limit)
+        self._samples.append(Sample(t, self._seq, shown, healthy, 0))

@@ -1,5 +1,6 @@
 """What the tool feels and what the sensor in the wrist makes of it, whichever arm carries them."""
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -8,6 +9,9 @@ from dmpcli.arrays import Floats
 from dmpcli.instruments.mock.parameters import Sensor
 from dmpcli.primitives import wrench
 from dmpcli.primitives.wrench import Tool
+
+# Readings whose noise is drawn at once: the loop that asks for them has other work to do.
+_DRAWN = 256
 
 
 class Hand(Protocol):
@@ -101,10 +105,15 @@ class Wrist:
         self._centre = tool.centre
         self._sensor_in_tcp, self._lever = tool.sensor_in_tcp, tool.lever
         self._zero = np.zeros(6) if tool.zero is None else tool.zero
+        self._noise = self._drawn()
 
     def noise(self) -> Floats:
         """Draw the noise of one reading, shape (6,)."""
-        return self._sensor.noise * self._rng.standard_normal(6)
+        return next(self._noise)
+
+    def _drawn(self) -> Iterator[Floats]:
+        while True:
+            yield from self._sensor.noise * self._rng.standard_normal((_DRAWN, 6))
 
     def sensed(self, force: Floats, rotation: Floats, age: float, noise: Floats) -> Floats:
         """Return one reading, shape (6,), N and N·m, sensor axes; it may be out of range.
