@@ -10,7 +10,7 @@ from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
 from dmpcli.calibration.settings import CalibrateSettings
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.errors import RefusedError
 from dmpcli.instruments import guards
 from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.protocols import RobotState
@@ -106,12 +106,7 @@ class Tour:
     def _check(self, state: RobotState, stops: list[Pose]) -> None:
         """Refuse before anything moves what would be refused on the way."""
         arm, s = self._arm, self._settings
-        shortest, longest = arm.info.period_range
-        if not shortest <= s.period <= longest:
-            raise InputError(
-                f"--period {s.period:g}: the {arm.info.make} robot takes {shortest:g} to "
-                f"{longest:g} s"
-            )
+        guards.check_period(arm.info, s.period, f"--period {s.period:g}")
         guards.check_state(state, s.workspace)
         # The sensor's turn on the flange changes nothing here.
         check_orientations(np.array([R for _, R in stops[1:-1]]), s.condition)

@@ -225,7 +225,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     robot = watched(bench.robot) if realtime else bench.robot
     try:
         arm = Arm(robot, robot.open(), clock)
-        session.check_period(arm, settings.period)
+        guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := session.slowed(arm.info.lookahead)):
             warn(late)
         reach = session.reach_of(bench.robot, request.robot_model, held)

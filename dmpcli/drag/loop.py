@@ -170,13 +170,8 @@ class Recorder:
         return ending.unless(closing)
 
     def _check_rates(self, servo: ServoInfo, sensor: SensorInfo) -> None:
-        shortest, longest = servo.period_range
         s = self._settings
-        if not shortest <= self._period <= longest:
-            raise InputError(
-                f"[record] control_rate = {s.control_rate:g} Hz: the {servo.make} robot takes "
-                f"{1.0 / longest:g} to {1.0 / shortest:g}"
-            )
+        guards.check_period(servo, self._period, f"[record] control_rate = {s.control_rate:g} Hz")
         if s.sensor_rate > sensor.rate:
             raise InputError(
                 f"[record] sensor_rate = {s.sensor_rate:g} Hz: the {sensor.make} sensor sends at "

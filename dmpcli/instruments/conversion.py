@@ -66,7 +66,13 @@ class PoseServo:
             self._space.check(joints, pose)
             if isinstance(self._driver, InverseDriver):
                 self._space.check_inverse(joints, self._theirs)
-        return ServoInfo(declared.make, declared.period_range, declared.lookahead, declared.queues)
+        return ServoInfo(
+            declared.make,
+            declared.period_range,
+            declared.lookahead,
+            declared.queues,
+            declared.period_step,
+        )
 
     @property
     def reach(self) -> Reach | None:

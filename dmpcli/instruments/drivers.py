@@ -57,6 +57,8 @@ class Declaration:
     queues : bool
         Whether it takes one set-point per period from a queue of one look-ahead, by its own clock;
         see `ServoInfo`.
+    period_step : float
+        Servo periods are whole multiples of it, s; 0 takes any.
     """
 
     make: str
@@ -73,6 +75,7 @@ class Declaration:
     tolerance: tuple[float, float] = (2.0, 0.02)
     remedy: str = ""
     queues: bool = False
+    period_step: float = 0.0
 
 
 @dataclass(frozen=True)

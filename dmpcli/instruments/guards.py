@@ -76,9 +76,14 @@ def check_state(state: RobotState, box: Box | None = None) -> None:
         The pose is not a number.
     """
     check_ready(state)
-    if not (np.isfinite(state.position).all() and np.isfinite(state.rotation).all()):
+    if not finite(state.position, state.rotation):
         raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
     check_inside(state.position, box, "the tool")
+
+
+def finite(*arrays: Floats) -> bool:
+    """Tell whether every number of a few small arrays is finite: in plain floats, for loops."""
+    return all(all(map(math.isfinite, array.ravel().tolist())) for array in arrays)
 
 
 def check_inside(position: Floats, box: Box | None, what: str) -> None:
@@ -99,7 +104,7 @@ def check_inside(position: Floats, box: Box | None, what: str) -> None:
     """
     if box is None:
         return
-    for axis, value, low, high in zip("xyz", position, box[::2], box[1::2], strict=True):
+    for axis, value, low, high in zip("xyz", position.tolist(), box[::2], box[1::2], strict=True):
         if not low <= value <= high:
             raise RefusedError(
                 f"{what} at {axis} = {value:.3f} mm leaves the workspace ({low:g} to {high:g} mm)"
@@ -119,7 +124,7 @@ def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:
     ------
     RefusedError
     """
-    if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+    if not finite(position, rotation):
         raise RefusedError("the next set-point is not a number and was not sent; check settings")
     check_inside(position, box, "the next set-point")
 
@@ -146,6 +151,34 @@ def check_wrench(wrench: Floats, force: float, torque: float) -> None:
                 f"{name} {size:.3g} {unit} on the tool is over {most:g} {unit}; raise "
                 f"--max-{name} if it may meet that"
             )
+
+
+def check_period(info: ServoInfo, period: float, asked: str) -> None:
+    """Refuse a servo period that the robot does not take.
+
+    Parameters
+    ----------
+    info : ServoInfo
+    period : float
+        s.
+    asked : str
+        How the user asked for it, for the message.
+
+    Raises
+    ------
+    InputError
+    """
+    shortest, longest = info.period_range
+    if not shortest <= period <= longest:
+        raise InputError(
+            f"{asked}: the {info.make} robot takes a set-point every {shortest:g} to {longest:g} s "
+            f"with its look-ahead of {info.lookahead:g} s"
+        )
+    step = info.period_step
+    if step > 0.0 and abs(period - step * round(period / step)) > 1e-9:
+        raise InputError(
+            f"{asked}: the {info.make} robot takes a set-point every whole {1e3 * step:g} ms"
+        )
 
 
 def check_late(late: float, info: ServoInfo, period: float) -> None:
@@ -213,8 +246,8 @@ class Trail:
             return 0.0, 0.0
         known = min(self._count, len(self._positions))
         away = self._positions[:known] - state.position
-        nearest = float((away * away).sum(axis=1).min())
-        trace = float((self._rotations[:known] @ state.rotation.ravel()).max())
+        nearest = float(np.minimum.reduce(np.vecdot(away, away)))
+        trace = float(np.maximum.reduce(self._rotations[:known] @ state.rotation.ravel()))
         # In this order a NaN stays one.
         cosine = min(max((trace - 1.0) / 2.0, -1.0), 1.0)
         return math.sqrt(nearest), math.acos(cosine)

@@ -103,12 +103,15 @@ class ServoInfo:
         Whether it takes one set-point per period from a queue of one look-ahead, by its own clock.
         Each deadline without a set-point then leaves the queue one shorter for good, unless the
         set-points that are owed are handed in later: they only queue, each for its own period.
+    period_step : float
+        Servo periods are whole multiples of it, s; 0 takes any.
     """
 
     make: str
     period_range: tuple[float, float]
     lookahead: float
     queues: bool = False
+    period_step: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -126,21 +126,6 @@ def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None
     return own
 
 
-def check_period(arm: Arm, period: float) -> None:
-    """Refuse a servo period that the robot does not take.
-
-    Raises
-    ------
-    InputError
-    """
-    shortest, longest = arm.info.period_range
-    if not shortest <= period <= longest:
-        raise InputError(
-            f"--period {period:g}: the {arm.info.make} robot takes {shortest:g} to {longest:g} s "
-            f"with its look-ahead of {arm.info.lookahead:g} s"
-        )
-
-
 def touch(
     sensor: Sensor,
     tool: Tool,

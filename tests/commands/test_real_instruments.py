@@ -78,17 +78,23 @@ def test_a_port_that_speaks_something_else_is_asked_about(traj, pen, tmp_path):
     assert "the controller's JSON-RPC port, as a rule 8055?" in last_line(result)
 
 
-def test_a_period_that_the_look_ahead_is_too_short_for_is_refused_before_streaming(traj, tmp_path):
+@pytest.mark.parametrize(
+    ("period", "words"),
+    [
+        (0.1, "the Elite EC66 robot takes a set-point every 0.002 to 0.05 s with its look-ahead"),
+        (0.0205, "the Elite EC66 robot takes a set-point every whole 1 ms"),
+    ],
+)
+def test_a_period_that_the_robot_does_not_take_is_refused_before_streaming(
+    traj, tmp_path, period, words
+):
     with Scripted() as robot:
         robot.pose = flange_at(HOME)
         robot.answers["inverseKinematic"] = robot.solve
         url = f"elite://{robot.query}&lookahead=0.1"
         out = tmp_path / "o.parquet"
-        result = dmpcli("execute", traj, "-o", out, "--robot", url, "--period", 0.1, expect=2)
-    assert (
-        "--period 0.1: the Elite EC66 robot takes 0.002 to 0.05 s with its look-ahead"
-        in last_line(result)
-    )
+        result = dmpcli("execute", traj, "-o", out, "--robot", url, "--period", period, expect=2)
+    assert f"--period {period}: {words}" in last_line(result)
     assert "streaming" not in result.stderr
 
 

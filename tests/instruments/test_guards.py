@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments import guards
 from dmpcli.instruments.guards import Trail
 from dmpcli.instruments.protocols import RobotState, ServoInfo
@@ -42,6 +44,23 @@ def test_only_a_pose_inside_is_sent():
     for position, rotation in ((NAN, LEVEL), (PLACE, LEVEL * np.nan), (2 * PLACE, LEVEL)):
         with pytest.raises(RefusedError, match="next set-point"):
             guards.check_setpoint(position, rotation, BOX)
+
+
+def test_a_period_out_of_the_robots_range_is_the_users_mistake():
+    for period in (0.002, 0.1):
+        guards.check_period(INFO, period, "--period")
+    for period in (0.001, 0.2):
+        with pytest.raises(InputError, match=r"--period: the fake robot .* 0\.002 to 0\.1 s"):
+            guards.check_period(INFO, period, "--period")
+
+
+def test_a_period_between_two_of_the_robots_steps_is_the_users_mistake():
+    info = replace(INFO, period_step=0.001)
+    for period in (1.0 / 50.0, 1.0 / 250.0, 0.003, 0.007):
+        guards.check_period(info, period, "--period")
+    for period in (1.0 / 60.0, 0.0205):
+        with pytest.raises(InputError, match="every whole 1 ms"):
+            guards.check_period(info, period, "--period")
 
 
 @pytest.mark.parametrize(("lookahead", "limit"), [(0.2, 0.1), (0.0, 0.02)])

@@ -14,19 +14,19 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments.drivers import Declaration, DriverState
-from dmpcli.instruments.elite.controller import Controller
-from dmpcli.instruments.elite.requests import Params
+from dmpcli.instruments.elite.base import ArmDriver
 from dmpcli.instruments.elite.settings import Settings
 from dmpcli.instruments.protocols import Clock
 
 REFUSED = 0.05
 """s: so long a refusal is waited upon for its reason, before anything is stopped."""
 
+_MILLISECOND = 1e-3
+
 _PUT = "tt_put_servo_joint_to_buf"
-_STOPS: tuple[tuple[str, Params], ...] = (("tt_clear_servo_joint_buf", {"clear": 0}), ("stop", {}))
 
 
-class StreamDriver:
+class StreamDriver(ArmDriver):
     """A `ServoDriver` that sends one set-point after the other.
 
     Parameters
@@ -35,27 +35,31 @@ class StreamDriver:
     clock : Clock
     """
 
+    STOPS = (("tt_clear_servo_joint_buf", {"clear": 0}), ("stop", {}))
+
     def __init__(self, settings: Settings, clock: Clock) -> None:
-        self._settings = settings
-        self._controller = Controller(settings, clock)
-        self._begun = self._running = False
+        super().__init__(settings, clock)
+        self._running = False
 
     def connect(self) -> Declaration:
-        """Connect; see `Controller.connect`."""
+        """Connect; see `Controller.connect`.
+
+        Raises
+        ------
+        InputError
+            The look-ahead is no whole number of ms.
+        """
+        _milliseconds(self._settings.lookahead)  # else it would be refused as motion begins
         self._controller.connect()
         declared = self._controller.declaration(self._settings.lookahead)
         shortest, longest = declared.period_range
         # The buffer must hold two set-points or more.
         range_ = shortest, min(longest, self._settings.lookahead / 2.0)
-        return replace(declared, queues=True, period_range=range_)
+        return replace(declared, queues=True, period_range=range_, period_step=_MILLISECOND)
 
     def state(self) -> DriverState:
         """Return what the monitor last told."""
         return self._controller.state(powered=self._running)
-
-    def inverse(self, pose: Floats, near: Floats) -> Floats | None:
-        """Joint angles of a TCP pose by the controller; see `Controller.inverse`."""
-        return self._controller.inverse(pose, near)
 
     def start(self, period: float) -> None:
         """Enter transparent transmission, and fill its buffer with the actual joint angles.
@@ -63,7 +67,8 @@ class StreamDriver:
         Raises
         ------
         InputError
-            The period is not a whole number of ms, or the look-ahead is shorter than two of them.
+            Period or look-ahead is no whole number of ms, or the look-ahead shorter than two of
+            the former.
         RefusedError
             The robot must not move.
         InstrumentError
@@ -115,27 +120,10 @@ class StreamDriver:
         self._controller.requests.unanswered(_PUT, params)
         return True
 
-    def buffer_level(self) -> int | None:
-        """The controller does not tell."""
-        return None
-
     def stop(self) -> None:
         """Empty the buffer, and stop; what was never begun is not stopped."""
         self._running = False
-        if self._begun:
-            self._controller.halt(*_STOPS)
-            self._begun = False  # only now: what failed is tried again
-
-    def halt(self) -> None:
-        """Stop while another call hangs."""
-        self._controller.halt_beside(*_STOPS)
-
-    def close(self) -> None:
-        """Stop and disconnect."""
-        try:
-            self.stop()
-        finally:
-            self._controller.close()
+        super().stop()
 
 
 def _milliseconds(seconds: float) -> int:

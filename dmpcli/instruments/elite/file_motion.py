@@ -11,19 +11,15 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.drivers import Declaration, DriverState
-from dmpcli.instruments.elite.controller import Controller
-from dmpcli.instruments.elite.requests import Params
-from dmpcli.instruments.elite.settings import Settings
-from dmpcli.instruments.protocols import Clock
+from dmpcli.instruments.elite.base import ArmDriver
 
 START_DELAY = 0.2
 """How long after the start the arm may take to begin, s; what it takes is not known."""
 
-_STOPS: tuple[tuple[str, Params], ...] = (("stop_trajectory", {}), ("stop", {}))
 _VERDICTS = {-1: "their number is wrong", -2: "their form is wrong", -3: "their times are wrong"}
 
 
-class FileDriver:
+class FileDriver(ArmDriver):
     """A `ServoDriver` and `PlanDriver`: it takes whole plans, and no set-points.
 
     Parameters
@@ -32,9 +28,7 @@ class FileDriver:
     clock : Clock
     """
 
-    def __init__(self, settings: Settings, clock: Clock) -> None:
-        self._controller = Controller(settings, clock)
-        self._begun = False
+    STOPS = (("stop_trajectory", {}), ("stop", {}))
 
     def connect(self) -> Declaration:
         """Connect; see `Controller.connect`."""
@@ -46,10 +40,6 @@ class FileDriver:
         if self._begun:
             self._controller.poll()
         return self._controller.state(powered=self._begun)
-
-    def inverse(self, pose: Floats, near: Floats) -> Floats | None:
-        """Joint angles of a TCP pose by the controller; see `Controller.inverse`."""
-        return self._controller.inverse(pose, near)
 
     def upload(
         self, targets: Floats, period: float, meanwhile: Callable[[], None] = lambda: None
@@ -114,24 +104,3 @@ class FileDriver:
     def send(self, target: Floats) -> bool:  # noqa: ARG002
         """Take no set-point."""
         return False
-
-    def buffer_level(self) -> int | None:
-        """The controller does not tell."""
-        return None
-
-    def stop(self) -> None:
-        """Stop; what was never begun is not stopped."""
-        if self._begun:
-            self._controller.halt(*_STOPS)
-            self._begun = False  # only now: what failed is tried again
-
-    def halt(self) -> None:
-        """Stop while another call hangs."""
-        self._controller.halt_beside(*_STOPS)
-
-    def close(self) -> None:
-        """Stop and disconnect."""
-        try:
-            self.stop()
-        finally:
-            self._controller.close()
