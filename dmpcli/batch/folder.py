@@ -13,10 +13,12 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dmpcli.batch.job import FACT, Job, Outcome, Part
+from dmpcli.batch.job import FACT, Job, Outcome, file_of
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas, streams
 from dmpcli.records.record import Record
+
+_TEMPORARY = f".{streams.PART}.*.tmp"
 
 
 class Folder:
@@ -32,14 +34,15 @@ class Folder:
         self.path = Path(job.folder)
         self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
 
-    def open(self, parts: Iterable[Part], whole: bool) -> dict[int, Outcome]:
+    def open(self, numbers: Iterable[int], whole: bool) -> dict[int, Outcome]:
         """Make room for these parts, and return the outcomes of those that are already there.
 
         What a finished batch ends with goes first, so that nobody takes the folder for one.
 
         Parameters
         ----------
-        parts : iterable of Part
+        numbers : iterable of int
+            Of the parts.
         whole : bool
             Whether these are all parts of the batch: then other parts are stale, and go.
 
@@ -52,45 +55,39 @@ class Folder:
             self.path.mkdir(exist_ok=True)
             (self.path / streams.MANIFEST).unlink(missing_ok=True)
             (self.path / streams.TABLE).unlink(missing_ok=True)
-            kept, files = {}, set()
-            for part in parts:
-                files.add(part.file)
-                for stale in self.path.glob(f".{part.file}.*.tmp"):
+            parts = {file_of(number): number for number in numbers}
+            for stale in self.path.glob(_TEMPORARY):
+                # Another machine may be writing a part of its own share.
+                if whole or stale.name[1:].split(".parquet.")[0] + ".parquet" in parts:
                     stale.unlink(missing_ok=True)
-                outcome = self._outcome(part)
+            kept = {}
+            for file, number in parts.items():
+                outcome = self._outcome(file, number)
                 if outcome is None:
-                    (self.path / part.file).unlink(missing_ok=True)
+                    (self.path / file).unlink(missing_ok=True)
                 else:
-                    kept[part.number] = outcome
+                    kept[number] = outcome
             if whole:
-                self._clear(files)
+                for other in self.path.glob(streams.PART):
+                    if other.name not in parts:
+                        other.unlink()
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
         return kept
 
-    def _clear_temporaries(self) -> None:
-        for stale in self.path.glob(f".{streams.PART}.*.tmp"):
-            stale.unlink(missing_ok=True)
-
-    def _clear(self, files: set[str]) -> None:
-        self._clear_temporaries()
-        for other in self.path.glob(streams.PART):
-            if other.name not in files:
-                other.unlink()
-
-    def _outcome(self, part: Part) -> Outcome | None:
+    def _outcome(self, name: str, number: int) -> Outcome | None:
         """Outcome of a part that is there, whole and of the same inputs; None otherwise."""
-        file = self.path / part.file
+        file = self.path / name
         try:
             footer = pq.read_metadata(file)
             found = json.loads((footer.metadata or {})[record.KEY])
             fact = found["facts"].pop(FACT)
         except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
-        if found != self._expected or fact.get("number") != part.number:
+        if found != self._expected or fact.get("number") != number:
             return None
         return Outcome(
-            part.number,
+            number,
             {int(row): why for row, why in fact["failed"].items()},
             {int(row): seconds for row, seconds in fact["clipped"].items()},
             fact["unfolded"],
@@ -115,7 +112,8 @@ class Folder:
         with contextlib.suppress(OSError):
             self.path.mkdir(exist_ok=True)
         # A worker that died in the middle of a part has left its half.
-        self._clear_temporaries()
+        for stale in self.path.glob(_TEMPORARY):
+            stale.unlink(missing_ok=True)
         streams.write(self.path / streams.TABLE, record.encode(table))
         text = json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
         streams.write(self.path / streams.MANIFEST, text.encode())

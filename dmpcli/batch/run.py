@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -92,18 +93,24 @@ class Batch:
 
     def parts(self) -> Iterator[Part]:
         """Yield the parts of this shard; part n holds rows n·size to (n+1)·size - 1."""
-        for number in range(-(-len(self.table) // self.size)):
-            first = number * self.size
-            rows = first + np.flatnonzero(self._admitted[first : first + self.size])
-            if self.shard.has(number) and len(rows):
-                ids = [self.table.ids[row] for row in rows]
-                yield Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+        return map(self._part, self.sizes)
+
+    def _part(self, number: int) -> Part:
+        first = number * self.size
+        rows = first + np.flatnonzero(self._admitted[first : first + self.size])
+        ids = [self.table.ids[row] for row in rows.tolist()]
+        return Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+
+    @cached_property
+    def sizes(self) -> dict[int, int]:
+        """How many pairs each part of this shard is to draw; parts with none are left out."""
+        counts = np.bincount(np.flatnonzero(self._admitted) // self.size).tolist()
+        return {n: size for n, size in enumerate(counts) if size and self.shard.has(n)}
 
     @property
     def count(self) -> int:
         """How many pairs this shard is to draw."""
-        numbers = np.flatnonzero(self._admitted) // self.size
-        return int(np.sum(numbers % self.shard.count == self.shard.index - 1))
+        return sum(self.sizes.values())
 
     def run(self, draw: Draw, advance: Callable[[int], None]) -> Summary:
         """Draw what is not there yet; with all parts there, write table and manifest.
@@ -127,22 +134,21 @@ class Batch:
             The folder cannot be written.
         """
         folder = Folder(self.job)
-        kept = folder.open(self.parts(), self.shard.whole)
+        kept = folder.open(self.sizes, self.shard.whole)
         summary = Summary(kept=len(kept))
-        sizes = {part.number: len(part) for part in self.parts()}
         try:
             for outcome in self._all(kept, draw):
-                self._note(outcome, sizes[outcome.number], summary)
-                advance(sizes[outcome.number])
+                self._note(outcome, self.sizes[outcome.number], summary)
+                advance(self.sizes[outcome.number])
         finally:
             folder.leave()
         if self.shard.whole:
-            folder.finish(self._table(), self._manifest(sizes))
+            folder.finish(self._table(), self._manifest())
         return summary
 
     def _all(self, kept: dict[int, Outcome], draw: Draw) -> Iterator[Outcome]:
         yield from kept.values()
-        yield from draw(self.job, (part for part in self.parts() if part.number not in kept))
+        yield from draw(self.job, map(self._part, (n for n in self.sizes if n not in kept)))
 
     def _note(self, outcome: Outcome, size: int, summary: Summary) -> None:
         self._outcomes[outcome.number] = outcome
@@ -161,9 +167,9 @@ class Batch:
     def _table(self) -> Record:
         """Return the table of pairs with what became of each."""
         good = self.table.good
-        files = [""] * len(self.table)
-        for row in np.flatnonzero(good).tolist():
-            files[row] = file_of(row // self.size)
+        names = [file_of(number) for number in range(len(self.table) // self.size + 1)]
+        numbers = np.arange(len(self.table)) // self.size
+        files = [names[n] if drawn else "" for n, drawn in zip(numbers.tolist(), good, strict=True)]
         return trajectory.pairs_record(
             self.table.ids,
             self.pairs,
@@ -209,16 +215,16 @@ class Batch:
                 normal[rows] = pair_charts(start, goal, frame.normal, task.skill.closed).normal
         return normal
 
-    def _manifest(self, sizes: dict[int, int]) -> dict[str, Any]:
+    def _manifest(self) -> dict[str, Any]:
         entries = [
             manifest.Entry(
                 file=file_of(number),
-                pairs=sizes[number],
+                pairs=size,
                 rows=self._outcomes[number].rows,
                 bytes=self._outcomes[number].size,
             )
-            for number in sorted(sizes)
+            for number, size in self.sizes.items()
             if self._outcomes[number].rows
         ]
-        drawn = sum(status == OK for status in self.table.status)
+        drawn = self.table.status.count(OK)
         return manifest.document(entries, len(self.table), drawn, self.job.provenance)

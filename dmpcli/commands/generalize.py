@@ -254,7 +254,6 @@ def _judge(
 
     from dmpcli.commands.generalize_inputs import ENDS
     from dmpcli.primitives.admission import admit
-    from dmpcli.records.pairs import OK
 
     rows = np.flatnonzero(table.good)
     verdict = admit(
@@ -271,10 +270,10 @@ def _judge(
         table.status[row] = place + _reason(verdict, int(i), settings.snap_tol)
     if not stop:
         return
-    upright = {int(rows[i]) for i in np.flatnonzero(verdict.upright)}
-    for row, status in enumerate(table.status):
-        if status != OK:
-            raise (RefusedError if row in upright else InputError)(f"{table.name}: {status}")
+    bad = np.flatnonzero(~table.good)
+    if len(bad):
+        upright = bad[0] in rows[verdict.upright]
+        raise (RefusedError if upright else InputError)(f"{table.name}: {table.status[bad[0]]}")
 
 
 def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> Any:

@@ -61,6 +61,8 @@ class PairTable:
     @property
     def good(self) -> Booleans:
         """Rows whose status is ``ok``, shape (B,)."""
+        if self.status.count(OK) == len(self):  # several times faster, and the usual case
+            return np.ones(len(self), dtype=bool)
         return np.array([status == OK for status in self.status], dtype=bool)
 
 

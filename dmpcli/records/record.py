@@ -171,10 +171,7 @@ def repeated(texts: Sequence[str], counts: int | Sequence[int]) -> Any:
     if len(content) >= 1 << 31:
         raise InputError("more text than one file can hold; give fewer --pairs-per-part")
     sizes = np.repeat(np.array([len(word) for word in words], dtype=np.int32), each)
-    ends = np.zeros(len(sizes) + 1, dtype=np.int32)
-    np.cumsum(sizes, out=ends[1:])
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(content)]
-    return pa.Array.from_buffers(pa.string(), len(sizes), buffers)
+    return pa.Array.from_buffers(pa.string(), len(sizes), _text_buffers(sizes, content))
 
 
 def _arrow(values: Any, kind: Any) -> Any:
@@ -183,16 +180,29 @@ def _arrow(values: Any, kind: Any) -> Any:
         return values
     # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
     if kind == pa.string():
-        texts = [b"" if value is None else str(value).encode() for value in values]
-        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
         known = np.array([value is not None for value in values], dtype=bool)
-        buffers = [_validity(known), pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
-        return pa.Array.from_buffers(kind, len(texts), buffers)
+        texts = list(values) if known.all() else ["" if v is None else v for v in values]
+        content = "".join(texts).encode()
+        sizes = np.fromiter(map(len, texts), np.int32, len(texts))
+        if len(content) != sizes.sum():  # some letter takes more than one byte
+            sizes = np.fromiter((len(text.encode()) for text in texts), np.int32, len(texts))
+        return pa.Array.from_buffers(kind, len(texts), _text_buffers(sizes, content, known))
     valid = None
     if values.dtype.kind == "f" and _may_hold_nan(values):
         valid = _validity(~np.isnan(values))
     data = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
     return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)])
+
+
+def _text_buffers(sizes: AnyArray, content: bytes, known: Booleans | None = None) -> list[Any]:
+    """Return Arrow's buffers of texts that have so many bytes each."""
+    ends = np.zeros(len(sizes) + 1, dtype=np.int32)
+    np.cumsum(sizes, out=ends[1:])
+    return [
+        None if known is None else _validity(known),
+        pa.py_buffer(ends),
+        pa.py_buffer(content),
+    ]
 
 
 def _may_hold_nan(values: Floats) -> bool:

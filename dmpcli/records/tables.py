@@ -23,6 +23,8 @@ PARQUET_MAGIC = b"PAR1"
 _BLOCK = 1 << 24
 _NUMBER = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"
 _PASSED_OVER = re.compile(rb"^[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
+_NEVER_WITHOUT = (b"#", b"\n\n", b"\n ", b"\n\t")
+"""A text that does not begin with a blank, and holds none of these, has no such line."""
 _SEPARATORS = (b",", b";", b"\t")
 
 
@@ -218,7 +220,8 @@ def _counted(source: Source) -> tuple[bytes, Integers]:
     if b"\r" in content:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     content = content.rstrip(b"\n")
-    if _PASSED_OVER.search(content) is None:
+    likely = content[:1] in b" \t\n" or any(sign in content for sign in _NEVER_WITHOUT)
+    if not likely or _PASSED_OVER.search(content) is None:
         return content, np.arange(1, content.count(b"\n") + 2)
     every = content.split(b"\n")
     kept = [number for number, line in enumerate(every) if not _PASSED_OVER.fullmatch(line)]
