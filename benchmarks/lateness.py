@@ -1,6 +1,7 @@
 """How punctual the loops of `record` and `execute` are, beside a bare loop on the same machine.
 
-    python -m benchmarks.lateness [--block 30] [--rates 50 250] [--robot URL] [--sensor URL]
+    python -m benchmarks.lateness [--block 30] [--rates 50 250]
+    python -m benchmarks.lateness --robot URL --sensor URL --tool FILE
 
 For each rate and each command six blocks take turns: the bare loop (absolute deadlines, sleep, read
 the clock, no work) and ours (everything, the journal too). Pooled over its three blocks our p99 may
@@ -13,6 +14,7 @@ import argparse
 import sys
 import tempfile
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -25,11 +27,13 @@ from dmpcli.drag.settings import RecordSettings
 from dmpcli.instruments import urls
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.mock import PEN, PEN_DOWN
+from dmpcli.instruments.mock import PEN, Scene
 from dmpcli.instruments.pace import Pace
 from dmpcli.instruments.watchdog import watched
-from dmpcli.records import schemas
+from dmpcli.primitives.wrench import Tool
+from dmpcli.records import schemas, streams
 from dmpcli.records import settings as layers
+from dmpcli.records import tool as tool_file
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance
 from dmpcli.streaming import plan as planning
@@ -67,6 +71,19 @@ Measured: TypeAlias = tuple[Pace, list[float]]
 """When cycles woke, sent and ended, and what each computed, s of processor time."""
 
 
+@dataclass(frozen=True)
+class Place:
+    """Which instruments are driven, and the tool on them."""
+
+    robot: str
+    sensor: str
+    tool: Tool
+
+    def connect(self, clock: MonotonicClock, scene: Scene) -> urls.Bench:
+        """Connect to them; the scene is a mock's."""
+        return urls.connect(self.robot, self.sensor, clock, scene=scene, tool=self.tool)
+
+
 def bare(period: float, duration: float) -> tuple[Floats, int]:
     """Return the lateness of each cycle of a loop that does nothing, s, and its missed periods."""
     late, missed, number = [], 0, 0
@@ -83,7 +100,7 @@ def bare(period: float, duration: float) -> tuple[Floats, int]:
     return np.array(late), missed
 
 
-def recording(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Measured:
+def recording(period: float, duration: float, folder: Path, at: Place) -> Measured:
     """Run the loop of `record` on the real clock, with watchdog and journal."""
     given = {
         "control_rate": 1.0 / period,
@@ -94,13 +111,13 @@ def recording(period: float, duration: float, folder: Path, robot: str, sensor: 
     }
     settings = layers.resolve(RecordSettings, "record", given, "drag")
     stroke, clock = references.build(settings), Metered()
-    bench = urls.connect(robot, sensor, clock, scene=rehearsal.scene(stroke, settings))
+    bench = at.connect(clock, rehearsal.scene(stroke, settings))
     tutored = rehearsal.rehearse(bench.lab, stroke, settings)
     recorder = Recorder(
         watched(bench.robot),
         bench.sensor,
         clock,
-        PEN.with_zero(None),
+        at.tool.with_zero(None),
         settings,
         tutored.longest,
         begin=tutored.begin,
@@ -116,7 +133,7 @@ def recording(period: float, duration: float, folder: Path, robot: str, sensor: 
     return recorder.pace, clock.computed
 
 
-def execution(period: float, duration: float, folder: Path, robot: str, sensor: str) -> Measured:
+def execution(period: float, duration: float, folder: Path, at: Place) -> Measured:
     """Run the loop of `execute` on the real clock, with sensor, watchdog and journal."""
     settings = layers.resolve(ExecuteSettings, "execute", {"period": period}, None)
     t = np.arange(round(duration * 100.0) + 1) / 100.0
@@ -125,13 +142,16 @@ def execution(period: float, duration: float, folder: Path, robot: str, sensor: 
     wave = np.column_stack([-109.0 * u, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
     stroke = planning.Stroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
     clock = Metered()
-    scene = session.scene(stroke, presses=False)
-    bench = urls.connect(robot, sensor, clock, scene=scene)
+    bench = at.connect(clock, session.scene(stroke, presses=False))
     servo = watched(bench.robot)
     arm = Arm(servo, servo.open(), clock)
-    plan = planning.make(stroke, period, 1.0, settings.limits, (stroke.position[0], PEN_DOWN), 20.0)
+    # From where it stands: the plan needs no approach.
+    here = servo.state()
+    stroke = replace(stroke, position=stroke.position + here.position - stroke.position[0])
+    start = stroke.position[0], here.rotation
+    plan = planning.make(stroke, period, 1.0, settings.limits, start, 20.0)
     watch = session.Watch(100.0, 1.0, 1e3, 1e3)
-    touch = session.touch(bench.sensor, PEN, plan, settings, arm, None)
+    touch = session.touch(bench.sensor, at.tool, plan, settings, arm, None)
     loop = Loop(plan, settings.limits, watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))
@@ -160,7 +180,10 @@ def main() -> int:
     options.add_argument("--rates", type=float, nargs="+", default=[50.0, 250.0], metavar="HZ")
     options.add_argument("--robot", default=ROBOT)
     options.add_argument("--sensor", default="mock:")
+    options.add_argument("--tool", type=Path, metavar="FILE", help="the mock knows its own")
     given = options.parse_args()
+    tool = tool_file.decode(streams.read(given.tool)) if given.tool else PEN
+    at = Place(given.robot, given.sensor, tool)
     passed = True
     with tempfile.TemporaryDirectory() as name:
         for rate in given.rates:
@@ -170,9 +193,7 @@ def main() -> int:
                 runs: list[Measured] = []
                 for _ in range(BLOCKS):
                     empty.append(bare(1.0 / rate, given.block))
-                    runs.append(
-                        ours(1.0 / rate, given.block, Path(name), given.robot, given.sensor)
-                    )
+                    runs.append(ours(1.0 / rate, given.block, Path(name), at))
                 passed &= _judge(empty, runs)
     print("passed" if passed else "failed")
     return 0 if passed else 1

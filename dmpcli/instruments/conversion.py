@@ -11,7 +11,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError, RefusedError
-from dmpcli.instruments import pose_forms
+from dmpcli.instruments import guards, pose_forms
 from dmpcli.instruments.drivers import (
     Declaration,
     DriverState,
@@ -140,7 +140,7 @@ class PoseServo:
         """
         if not self._started:
             return False
-        if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+        if not guards.finite(position, rotation):
             return False
         if self._space is None:
             return self._driver.send(pose_forms.encode(self._declared, position, rotation))
@@ -177,7 +177,7 @@ class PoseServo:
         """Actual joint angles, rad."""
         if said.joints is None:
             return None
-        if not (said.joints.ndim == 1 and np.isfinite(said.joints).all()):
+        if not (said.joints.ndim == 1 and guards.finite(said.joints)):
             raise self._senseless("joint angles that are not numbers")
         if self._space is not None and len(said.joints) != 6:
             raise self._senseless(f"{len(said.joints)} joint angles")

@@ -193,7 +193,7 @@ class JointSpace:
         return distance <= most and angle <= most_angle
 
     def _tcp(self, joints: Floats, base: Floats, flange: Floats) -> Pose:
-        position, rotation = chain.forward(self._arm, joints)
+        position, rotation = chain.forward_one(self._arm, joints)
         attitude = base @ rotation @ flange
         return base @ position + attitude @ self._reach, attitude @ self._attitude
 

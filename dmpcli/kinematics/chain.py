@@ -1,5 +1,8 @@
 """From joint angles to the flange: forward kinematics and the geometric Jacobian."""
 
+import math
+from functools import lru_cache
+
 import numpy as np
 
 from dmpcli.arrays import Floats
@@ -23,6 +26,41 @@ def forward(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
     """
     position, rotation = frames(arm, q)
     return position[..., 6, :], rotation[..., 6, :, :]
+
+
+def forward_one(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
+    """`forward` of one set of joint angles, in plain floats: several times faster, for loops.
+
+    Parameters
+    ----------
+    arm : Arm
+    q : array, shape (6,)
+        rad.
+
+    Returns
+    -------
+    position : array, shape (3,)
+        mm.
+    rotation : array, shape (3, 3)
+    """
+    # Origin and axes of the link frame that has been reached.
+    px = py = pz = 0.0
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    for angle, (offset, d, a, ca, sa) in zip(q.tolist(), _links(arm), strict=True):
+        c, s = math.cos(angle + offset), math.sin(angle + offset)
+        ux, uy, uz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
+        xx, xy, xz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
+        px, py, pz = px + d * zx + a * xx, py + d * zy + a * xy, pz + d * zz + a * xz
+        yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
+        zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
+    return np.array([px, py, pz]), np.array([[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]])
+
+
+@lru_cache
+def _links(arm: Arm) -> list[tuple[float, float, float, float, float]]:
+    """Offset, d, a, and cosine and sine of alpha, of each link."""
+    columns = (arm.offset, arm.d, arm.a, np.cos(arm.alpha), np.sin(arm.alpha))
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def frames(arm: Arm, q: Floats) -> tuple[Floats, Floats]:

@@ -193,19 +193,23 @@ def nearest(arm: Arm, position: Floats, rotation: Floats, reference: Floats) -> 
     """
     g = _geometry(arm)
     before = reference.tolist()
-    offset = arm.offset.tolist()
-    best: list[float] = []
+    # The reference as angles φ.
+    here = (reference + arm.offset).tolist()
+    steps: list[float] = []
     least = math.inf
-    for phi in _each(g, position.tolist(), rotation.tolist(), before[5] + offset[5]):
-        q = [
-            b + math.remainder(p - o - b, _TURN)
-            for p, o, b in zip(phi, offset, before, strict=True)
-        ]
-        away = sum((a - b) ** 2 for a, b in zip(q, before, strict=True))
-        if away < least:
-            best, least = q, away
-    if not best:
+    for phi in _each(g, position.tolist(), rotation.tolist(), here[5]):
+        way, away = [], 0.0
+        for p, h in zip(phi, here, strict=True):
+            step = math.remainder(p - h, _TURN)
+            way.append(step)
+            away += step * step
+            if not away < least:
+                break
+        else:
+            steps, least = way, away
+    if not steps:
         raise RefusedError(why_not(arm, position, rotation))
+    best = [b + step for b, step in zip(before, steps, strict=True)]
     for joint, (angle, (low, high)) in enumerate(zip(best, arm.limits.tolist(), strict=True), 1):
         if not low - _SLACK <= angle <= high + _SLACK:
             raise RefusedError(

@@ -180,7 +180,7 @@ def test_joint_set_points_bring_the_tools_tip_to_the_pose():
     state = servo.state()
     position, rotation = chain.forward(ARM, HOME)
     np.testing.assert_allclose(state.position, position + rotation @ PEN.tcp_position)
-    np.testing.assert_allclose(state.rotation, rotation @ PEN.tcp_rotation)
+    np.testing.assert_allclose(state.rotation, rotation @ PEN.tcp_rotation, atol=1e-12)
     np.testing.assert_allclose(state.joints, HOME)
     goal = state.position + [1.0, -2.0, 0.5]
     assert servo.send(goal, state.rotation)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,14 @@ def test_any_leading_shape_gives_what_one_configuration_gives():
     assert np.array_equal(position[1, 2], one[0])
     assert np.array_equal(rotation[1, 2], one[1])
     assert np.array_equal(chain.jacobian(EC66, q)[1, 2], chain.jacobian(EC66, q[1, 2]))
+
+
+def test_one_configuration_in_plain_floats_is_where_many_are():
+    tilted = replace(EC66, alpha=EC66.alpha + np.arange(6) * 0.3, a=EC66.a + 7.0, d=EC66.d + 5.0)
+    for arm in (EC66, tilted):
+        for q in np.random.default_rng(6).uniform(-2 * np.pi, 2 * np.pi, (50, 6)):
+            for one, many in zip(chain.forward_one(arm, q), chain.forward(arm, q), strict=True):
+                np.testing.assert_allclose(one, many, rtol=0.0, atol=1e-9)
 
 
 def test_the_jacobian_is_the_derivative_of_the_chain():

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -101,6 +101,7 @@ def test_too_near_to_the_first_axis_is_out_of_reach():
 
 
 @settings(deadline=None, max_examples=200)
+@example(np.array([2e-05, 0.998046875, 2e-05, 0.125, 2e-05, 0.0]))
 @given(ANGLES)
 def test_the_scalar_way_finds_what_the_array_way_finds(q):
     position, rotation = chain.forward(EC66, q)
@@ -110,8 +111,9 @@ def test_the_scalar_way_finds_what_the_array_way_finds(q):
     if measure.min() < 1e-6 or abs(q[2]) > np.radians(160):
         return
     one = inverse.nearest(EC66, position, rotation, reference)
-    # Near a singularity the angles are worth less: an error of the pose is divided by its measure.
-    slack = 1e-8 + 1e-11 / measure.min()
+    # Near a singularity the angles are worth less: an error of the pose is divided by its measure,
+    # and near two of them by both.
+    slack = 1e-8 + 1e-11 / measure.min() + 1e-15 / np.prod(np.sort(measure)[:2])
     assert np.nanmin(turned(found, one)) < slack
     assert np.linalg.norm(one - reference) <= np.linalg.norm(q - reference) + slack
 

@@ -18,6 +18,7 @@ from dmpcli.errors import InstrumentError
 from dmpcli.instruments import sockets
 from dmpcli.instruments.elite.replies import BadReplyError, ReplyBuffer, result_of
 
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _AT_ONCE = struct.pack("ii", 1, 0)  # of SO_LINGER: on, no time left
 
 
@@ -137,7 +138,7 @@ class Client:
             raise self._failed(method, "a reply came that nobody asked for")
         self._number += 1
         request = {"method": method, "params": params or {}, "jsonrpc": "2.0", "id": self._number}
-        line = json.dumps(request, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+        line = _ENCODER.encode(request).encode() + b"\n"
         try:
             self._socket.settimeout(_left(deadline))
             self._socket.sendall(line)

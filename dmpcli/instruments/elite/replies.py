@@ -62,17 +62,22 @@ class ReplyBuffer:
             self._pending = self._pending.lstrip(_SPACE)
             if self._pending and self._pending[0] != ord("{"):
                 raise BadReplyError(f"is no JSON object: {bytes(self._pending[:20])!r}")
+        if self._scanned == 0 and _plainly_whole(self._pending):
+            return self._cut(self._pending.rfind(b"}") + 1)
         for at in range(self._scanned, len(self._pending)):
             self._step(self._pending[at])
             if self._depth == 0:
-                whole = bytes(self._pending[: at + 1])
-                del self._pending[: at + 1]
-                self._scanned = 0
-                return whole
+                return self._cut(at + 1)
         self._scanned = len(self._pending)
         if self._scanned > LONGEST:
             raise BadReplyError(f"is longer than {LONGEST} bytes")
         return None
+
+    def _cut(self, size: int) -> bytes:
+        whole = bytes(self._pending[:size])
+        del self._pending[:size]
+        self._scanned = 0
+        return whole
 
     def _step(self, byte: int) -> None:
         if self._escaped:
@@ -86,6 +91,15 @@ class ReplyBuffer:
             self._depth += 1
         elif byte in b"}]":
             self._depth -= 1
+
+
+def _plainly_whole(text: bytearray) -> bool:
+    """Tell whether bytes that begin with a brace are one object, without looking at each of them.
+
+    The usual reply is: braces only around it, and the last one in no text.
+    """
+    plain = text.count(b"{") == 1 and text.count(b"}") == 1 and b"\\" not in text
+    return plain and text.rstrip(_SPACE).endswith(b"}") and text.count(b'"') % 2 == 0
 
 
 def result_of(reply: bytes, number: int) -> Any:
@@ -136,9 +150,7 @@ def _refusal(error: Any) -> Refusal:
 
 def _decoded(text: bytes, what: str) -> Any:
     try:
-        return json.loads(
-            text.decode("utf-8"), parse_constant=_no_constant, object_pairs_hook=_object
-        )
+        return _DECODER.decode(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise BadReplyError(f"is not JSON in {what}: {error}") from None
 
@@ -152,6 +164,9 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(named) != len(pairs):
         raise ValueError("a name stands twice")
     return named
+
+
+_DECODER = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_object)
 
 
 def boolean(value: Any) -> bool:
