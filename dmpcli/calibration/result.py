@@ -144,6 +144,6 @@ def _check_residual(found: Identification, limit: float) -> None:
     worst = int(np.argmax(np.where(found.used, size, -1.0)))
     raise RefusedError(
         f"the poses do not fit one tool: residual {force:.3g} N, {torque:.2g} N·m RMS, largest at "
-        f"pose {worst + 1};\nis the sensor turned on the flange otherwise than the tool file says, "
+        f"pose {worst + 1}; is the sensor turned on the flange otherwise than the tool file says, "
         "does a cable pull, did something touch?"
     )

@@ -121,7 +121,7 @@ class Tour:
                     raise RefusedError(
                         f"the arm cannot turn the tool through all poses from here: "
                         f"{check.quantity} {check.value:.3g} {check.unit} is over "
-                        f"{check.limit:.3g} {check.unit};\nbegin in another pose, or give a "
+                        f"{check.limit:.3g} {check.unit}; begin in another pose, or give a "
                         "smaller --tilt"
                     )
 

@@ -189,8 +189,7 @@ def _check_rest(tool: Tool, sensed: Floats, rotation: Floats, tolerance: float) 
     force, torque = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
     if not (force <= tolerance and torque <= LEVER * tolerance):
         raise RefusedError(
-            f"--tool: at rest {force:.2f} N and {torque:.3f} N·m are left of the sensor's reading, "
-            f"over {tolerance:g} N and {LEVER * tolerance:g} N·m: let go of the tool and lift it "
-            "clear;\nif nothing touches it, the calibration is of another tool or out of date: "
-            "dmpcli calibrate; if it shall press on something: --tool-check N"
+            f"--tool: leaves {force:.2f} N and {torque:.3f} N·m of the reading at rest, over "
+            f"{tolerance:g} N and {LEVER * tolerance:g} N·m: calibrated for another tool (dmpcli "
+            "calibrate), or something touches this one (lift it clear, or give --tool-check N)"
         )

@@ -114,7 +114,7 @@ def test_a_reading_that_the_tool_does_not_explain_is_refused(external, words):
 )
 def test_the_calibration_of_another_tool_is_refused(other):
     felt = sensing(at_rest(PEN, np.zeros(6)))
-    with pytest.raises(RefusedError, match="of another tool or out of date"):
+    with pytest.raises(RefusedError, match="calibrated for another tool"):
         felt.zeroed(other, PEN_DOWN, 0.5, 1.5)
 
 
