@@ -71,7 +71,7 @@ def test_a_pose_that_was_touched_is_left_out_by_what_contradicts():
 def test_a_sensor_turned_otherwise_than_the_file_says_is_refused_with_the_reason():
     turned = Rotation.from_euler("z", 30, degrees=True).as_matrix()
     with pytest.raises(
-        RefusedError, match=r"do not fit one tool: residual 2[^;]*;\nis the sensor turn"
+        RefusedError, match=r"do not fit one tool: residual 2[^;]*; is the sensor turn"
     ):
         identified(poses(replace(PEN, sensor_rotation=turned, inclination=np.array([0.3, 0.2]))))
 

@@ -89,7 +89,10 @@ def test_a_tool_that_explains_the_reading_within_the_tolerance_may_go_on(externa
 @pytest.mark.parametrize(
     ("external", "words"),
     [
-        ([0, 0, 1.6, 0, 0, 0], r"1\.60 N and 0\.000 N·m are left .* over 1\.5 N and 0\.15 N·m"),
+        (
+            [0, 0, 1.6, 0, 0, 0],
+            r"1\.60 N and 0\.000 N·m of the reading at rest, over 1\.5 N and 0\.15 N·m",
+        ),
         ([1.6, 0, 0, 0, 0, 0], r"1\.60 N and 0\.216 N·m"),
         ([0, 0, 0, 0, 0, 0.16], r"0\.00 N and 0\.160 N·m"),
     ],
