@@ -30,6 +30,7 @@ from benchmarks.surfaces import FACES
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
 from dmpcli.batch.job import Task
+from dmpcli.commands.batches import PAIRS_PER_PART
 from dmpcli.primitives.drawing import Style, draw_blocks
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.records import skill as skill_file
@@ -38,7 +39,8 @@ from dmpcli.surfaces.mesh import Mesh
 from tests.surfaces import cases, fields
 
 HEADER = "x0,y0,z0,xg,yg,zg"
-FIRST, FEW, MANY, MILLION = 4_000, 20_000, 100_000, 1_000_000
+FEW, MANY, MILLION = 20_000, 100_000, 1_000_000
+FIRST = 2 * PAIRS_PER_PART
 ROUNDS, GROWTH_TURNS = 4, 4
 PLATE = -17.5
 
@@ -230,7 +232,7 @@ def growth(place: Path) -> None:
         for count, times in sizes.items():
             for _ in range(times):
                 walls[count].append(seconds(command(place, tables[count], folder, *options)))
-    memories = {count: peak(command(place, tables[count], folder, *options)) for count in sizes}
+    memories = {n: peak(command(place, tables[n], folder, *options)) for n in (FEW, MANY, MILLION)}
     size = sum(part.stat().st_size for part in folder.glob("*"))
     shutil.rmtree(folder)
     first = np.mean(walls[FIRST])

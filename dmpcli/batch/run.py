@@ -91,11 +91,8 @@ class Batch:
         self._admitted = self.table.good
         self._outcomes: dict[int, Outcome] = {}
 
-    def parts(self) -> Iterator[Part]:
-        """Yield the parts of this shard; part n holds rows n·size to (n+1)·size - 1."""
-        return map(self._part, self.sizes)
-
     def _part(self, number: int) -> Part:
+        """Part n: rows n·size to (n+1)·size - 1."""
         first = number * self.size
         rows = first + np.flatnonzero(self._admitted[first : first + self.size])
         ids = [self.table.ids[row] for row in rows.tolist()]

@@ -203,7 +203,11 @@ class PoseServo:
         """Joint angles of a pose by the controller's inverse kinematics, rad."""
         assert isinstance(self._driver, InverseDriver)
         found = self._driver.inverse(pose, self._written(near))
-        return None if found is None else self._radians(found)
+        if found is None:
+            return None
+        if not (found.shape == (6,) and guards.finite(found)):
+            raise self._senseless("an inverse that is not six numbers")
+        return self._radians(found)
 
     def _senseless(self, what: str) -> InstrumentError:
         return InstrumentError(f"robot: {self._declared.make} sends {what}; check its driver")

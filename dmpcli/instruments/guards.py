@@ -174,13 +174,13 @@ def check_period(info: ServoInfo, period: float, asked: str) -> None:
     shortest, longest = info.period_range
     if not shortest <= period <= longest:
         raise InputError(
-            f"{asked}: the {info.make} robot takes a set-point every {shortest:g} to {longest:g} s "
-            f"with its look-ahead of {info.lookahead:g} s"
+            f"{asked}: the {info.make} robot takes periods of {shortest:g} to {longest:g} s "
+            f"({1.0 / longest:g} to {1.0 / shortest:g} Hz), its look-ahead is {info.lookahead:g} s"
         )
     step = info.period_step
     if step > 0.0 and abs(period - step * round(period / step)) > 1e-9:
         raise InputError(
-            f"{asked}: the {info.make} robot takes a set-point every whole {1e3 * step:g} ms"
+            f"{asked}: the {info.make} robot takes periods of whole multiples of {1e3 * step:g} ms"
         )
 
 

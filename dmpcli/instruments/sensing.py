@@ -158,6 +158,10 @@ class Sensing:
                 f"force sensor: sample {sample.seq} is saturated or flagged as faulty, stopped; "
                 "use less force, or check range and cable"
             )
+        if not (isinstance(sample.wrench, np.ndarray) and sample.wrench.shape == (6,)):
+            raise InstrumentError(
+                f"force sensor: sample {sample.seq} is no array of six, stopped; check its driver"
+            )
         if not guards.finite(sample.wrench):
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is not a number, stopped; check its driver"

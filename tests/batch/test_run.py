@@ -103,6 +103,20 @@ def test_shards_leave_the_table_and_manifest_to_the_last_run(learned, whole, tmp
     assert content(tmp_path / "b") == files
 
 
+def test_a_shard_leaves_alone_what_another_one_is_writing(learned, whole, tmp_path):
+    table, files = whole
+    folder = tmp_path / "b"
+    folder.mkdir()
+    ours, theirs = (folder / f".part-0000{n}.parquet.x.tmp" for n in (0, 1))
+    for half in (ours, theirs):
+        half.write_bytes(b"half")
+    run(learned, folder, table, "--on-error", "skip", "--shard", "1/2")
+    assert not ours.exists()
+    assert theirs.exists()
+    run(learned, folder, table, "--on-error", "skip")
+    assert content(folder) == files
+
+
 def test_a_resumed_run_keeps_whole_parts_and_draws_the_others_again(learned, whole, tmp_path):
     table, files = whole
     folder = tmp_path / "b"

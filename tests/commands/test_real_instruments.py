@@ -81,8 +81,8 @@ def test_a_port_that_speaks_something_else_is_asked_about(traj, pen, tmp_path):
 @pytest.mark.parametrize(
     ("period", "words"),
     [
-        (0.1, "the Elite EC66 robot takes a set-point every 0.002 to 0.05 s with its look-ahead"),
-        (0.0205, "the Elite EC66 robot takes a set-point every whole 1 ms"),
+        (0.1, "the Elite EC66 robot takes periods of 0.002 to 0.05 s (20 to 500 Hz)"),
+        (0.0205, "the Elite EC66 robot takes periods of whole multiples of 1 ms"),
     ],
 )
 def test_a_period_that_the_robot_does_not_take_is_refused_before_streaming(

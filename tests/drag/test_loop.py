@@ -295,7 +295,7 @@ def test_a_sensor_that_never_speaks_is_named_before_anything_moves():
     [
         (
             {"control_rate": 5.0},
-            "control_rate = 5 Hz: the fake robot takes a set-point every",
+            "control_rate = 5 Hz: the fake robot .*10 to 500 Hz",
         ),
         ({"sensor_rate": 2000.0}, "sensor_rate = 2000 Hz: the fake sensor sends at most 1000"),
     ],

@@ -283,6 +283,12 @@ def test_another_inverse_kinematics_is_refused(error):
         opened(Solver(error))
 
 
+@pytest.mark.parametrize("error", [np.full(6, np.inf), np.full(6, np.nan)])
+def test_an_inverse_kinematics_that_is_no_number_is_the_drivers_fault(error):
+    with pytest.raises(InstrumentError, match="sends an inverse that is not six numbers"):
+        opened(Solver(error))
+
+
 def test_euler_angles_that_a_pen_pointing_down_cannot_tell_apart_show_in_the_inverse_kinematics():
     other = declared(orientation="zyx euler")
     driver = Solver(np.zeros(6), other)

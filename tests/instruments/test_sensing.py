@@ -37,6 +37,8 @@ UNBELIEVABLE = [
     (sample(0.0, healthy=False), "sample 7 is saturated"),
     (sample(0.0, np.nan), "sample 7 is not a number"),
     (sample(0.0, np.inf), "sample 7 is not a number"),
+    (Sample(0.0, 7, [0.0] * 6, healthy=True, lost=0), "sample 7 is no array of six"),
+    (Sample(0.0, 7, np.zeros(3), healthy=True, lost=0), "sample 7 is no array of six"),
     (sample(0.0, -80.5), "Fx = -80.5 is over 80% of its range"),
     (sample(0.0, torque=8.1), "Ty = 8.1 is over 80% of its range"),
 ]

@@ -34,6 +34,13 @@ def with_header(columns, **header):
     return table.replace_schema_metadata({"dmpcli": json.dumps(base | header)})
 
 
+@given(st.lists(st.none() | st.text()))
+def test_texts_round_trip_whatever_their_letters(values):
+    column = record._arrow(values, pa.string())
+    column.validate(full=True)
+    assert column.to_pylist() == values
+
+
 @given(
     st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=30)
 )

@@ -164,6 +164,16 @@ def test_any_table_is_read_or_refused_by_name(text):
         assert "any.csv" in str(error)
 
 
+@given(st.text(alphabet="a,# \t\n\r", max_size=60))
+def test_lines_that_count_keep_their_numbers(text):
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip(" \t")[:1] not in ("", "#")]
+    joined, numbers = tables._counted(Source("any.csv", text.encode()))
+    assert joined.decode() == "\n".join(line for _, line in kept)
+    if kept:
+        assert numbers.tolist() == [i for i, _ in kept]
+
+
 def test_the_shortest_stroke_has_ten_samples():
     values = np.column_stack([T, XYZ])[: recordings.SHORTEST]
     assert len(stroke(csv(values=values)).t) == 10

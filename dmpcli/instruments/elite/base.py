@@ -1,6 +1,5 @@
 """What both ways to move an EC arm share: whom they ask, and how the arm is left."""
 
-import abc
 from typing import ClassVar
 
 from dmpcli.arrays import Floats
@@ -10,7 +9,7 @@ from dmpcli.instruments.elite.settings import Settings
 from dmpcli.instruments.protocols import Clock
 
 
-class ArmDriver(abc.ABC):
+class ArmDriver:
     """The part of a `ServoDriver` that does not depend on how set-points travel.
 
     Parameters

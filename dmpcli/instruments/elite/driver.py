@@ -49,7 +49,9 @@ class StreamDriver(ArmDriver):
         InputError
             The look-ahead is no whole number of ms.
         """
-        _milliseconds(self._settings.lookahead)  # else it would be refused as motion begins
+        _milliseconds(
+            "lookahead", self._settings.lookahead
+        )  # else it would be refused as motion begins
         self._controller.connect()
         declared = self._controller.declaration(self._settings.lookahead)
         shortest, longest = declared.period_range
@@ -75,7 +77,7 @@ class StreamDriver(ArmDriver):
             The controller does not do it.
         """
         s = self._settings
-        t, lookahead = _milliseconds(period), _milliseconds(s.lookahead)
+        t, lookahead = _milliseconds("period", period), _milliseconds("lookahead", s.lookahead)
         if lookahead < 2 * t:
             raise InputError(
                 f"--robot: lookahead = {s.lookahead:g} s: must be two servo periods or more, "
@@ -126,8 +128,10 @@ class StreamDriver(ArmDriver):
         super().stop()
 
 
-def _milliseconds(seconds: float) -> int:
+def _milliseconds(name: str, seconds: float) -> int:
     whole = round(1e3 * seconds)
     if abs(1e3 * seconds - whole) > 1e-6:
-        raise InputError(f"--robot: {seconds:g} s is not a whole number of ms, as the EC takes it")
+        raise InputError(
+            f"--robot: {name} = {seconds:g} s: must be a whole number of ms, as the EC takes it"
+        )
     return whole

@@ -408,7 +408,7 @@ def test_it_can_be_stopped_while_a_call_hangs(robot, arm):
 
 
 def test_a_look_ahead_that_it_cannot_be_told_is_refused_before_connecting(robot, arm):
-    with pytest.raises(InputError, match="whole number of ms"):
+    with pytest.raises(InputError, match=r"lookahead = 0\.0995 s: must be a whole number of ms"):
         arm(lookahead=0.0995).open()
     assert not robot.methods()
 

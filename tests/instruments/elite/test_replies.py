@@ -34,6 +34,18 @@ def test_replies_are_found_however_the_stream_is_chopped(results, end, data):
     assert buffer.empty
 
 
+@pytest.mark.parametrize("result", ["}", '"}', "\\", '{"a":"}"}', "{", '\\"}', ""])
+def test_braces_and_quotes_within_a_text_end_no_reply(result):
+    whole = json.dumps({"id": 7, "result": result}).encode()
+    for cut in range(1, len(whole)):
+        buffer = ReplyBuffer()
+        buffer.feed(whole[:cut])
+        assert buffer.take() is None
+        buffer.feed(whole[cut:] + b"\n")
+        assert buffer.take() == whole
+        assert buffer.empty
+
+
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_reply_or_a_fault(data):
     buffer = ReplyBuffer()
