@@ -6,6 +6,7 @@ Only the fields that clients are known to read are there, by the names of the re
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socketserver import TCPServer
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
@@ -62,9 +63,8 @@ class _Server(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Bind without looking up the host's name, which can take seconds."""
-        self.socket.bind(self.server_address)
-        name, port = self.socket.getsockname()
-        self.server_address, self.server_name, self.server_port = (name, port), name, port
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = self.socket.getsockname()
 
     def handle_error(self, request: object, client_address: object) -> None:
         """A client that goes away is none of the box's business."""

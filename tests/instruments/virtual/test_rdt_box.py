@@ -273,6 +273,14 @@ def test_a_port_that_is_taken_leaves_nothing_open():
             pass
 
 
+def test_a_box_that_was_closed_can_be_opened_at_its_ports_again_at_once():
+    with running_box() as box:
+        page(box, "netftapi2.xml")  # the closed connection lingers for a minute
+        ports = {name: getattr(box, name) for name in ("rdt_port", "http_port", "tcp_port")}
+    with running_box(**ports) as again:
+        assert page(again, "netftapi2.xml")
+
+
 def test_closing_twice_is_closing_once():
     with running_box() as box:
         box.close()
