@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor, Workspace
+from dmpcli.commands.options import (
+    AllowMixed,
+    Config,
+    Period,
+    Quiet,
+    Realtime,
+    Robot,
+    Sensor,
+    Workspace,
+)
 from dmpcli.errors import InputError, RefusedError, counted
 
 if TYPE_CHECKING:
@@ -52,9 +61,7 @@ def command(
     max_residual: Annotated[
         float | None, typer.Option(metavar="N", help="Refuse poses that fit worse, RMS (0.3).")
     ] = None,
-    period: Annotated[
-        float | None, typer.Option(metavar="S", help="Servo period, 0.02 s by default.")
-    ] = None,
+    period: Period = None,
     max_rotation_speed: Annotated[float | None, typer.Option(metavar="RAD_PER_S")] = None,
     max_force: Annotated[
         float | None, typer.Option(metavar="N", help="Stop when the reading changes by more (30).")
@@ -71,9 +78,7 @@ def command(
     preset: Annotated[
         str | None, typer.Option(metavar="NAME|FILE.toml", help="[calibrate] section.")
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="Beats the preset.")
-    ] = None,
+    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Identify what hangs on the sensor from static poses, with nothing touching the tool.

@@ -9,9 +9,11 @@ import typer
 from dmpcli.commands.options import (
     SENSORS,
     AllowMixed,
+    Config,
     FollowingError,
     MaxForce,
     MaxTorque,
+    Period,
     Quiet,
     Realtime,
     Robot,
@@ -81,9 +83,7 @@ def command(
     retract_speed: Annotated[
         float | None, typer.Option(metavar="MM_PER_S", help="Off the work, at most (50).")
     ] = None,
-    period: Annotated[
-        float | None, typer.Option(metavar="S", help="Servo period, 0.02 s by default.")
-    ] = None,
+    period: Period = None,
     approach: Annotated[
         float | None,
         typer.Option(metavar="MM_PER_S", help="Go to the start, no faster than this."),
@@ -108,9 +108,7 @@ def command(
     preset: Annotated[
         str | None, typer.Option(metavar="NAME|FILE.toml", help="[execute] section.")
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="Beats the preset.")
-    ] = None,
+    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once."""
@@ -236,7 +234,8 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         if keeper is None:
             return
         loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
-        provenance = _provenance(settings, request, batch, tool_file, bench.simulated)
+        simulated = bench.simulated or loop.virtual
+        provenance = _provenance(settings, request, batch, tool_file, simulated)
         provenance.facts.update(session.facts_of(arm, coupling, settings))
         outcome = _stream(loop, provenance, request, realtime, keeper)
     finally:

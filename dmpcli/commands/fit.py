@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.options import Quiet
+from dmpcli.commands.options import Config, Quiet
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def command(
         bool | None, typer.Option("--trim/--no-trim", help="Cut off idle ends (default).")
     ] = None,
     preset: Annotated[str, typer.Option(help="default, paper, or a TOML file.")] = "default",
-    config: Annotated[Path | None, typer.Option(help="TOML file with a [fit] section.")] = None,
+    config: Config = None,
     layout: Annotated[
         str | None, typer.Option(help="Columns and units of a known recorder: ur or tum.")
     ] = None,

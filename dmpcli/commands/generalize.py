@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.options import Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import Config, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError, RefusedError, counted
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def command(
     preset: Annotated[
         str | None, typer.Option(help="TOML file with a [generalize] section.")
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="The same; beats the preset.")] = None,
+    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw a skill at new start and goal points."""

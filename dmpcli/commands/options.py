@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -36,6 +37,10 @@ MaxForce = Annotated[
 ]
 MaxTorque = Annotated[
     float | None, typer.Option(metavar="N_M", help="Stop at a larger torque about its tip.")
+]
+Period = Annotated[float | None, typer.Option(metavar="S", help="Servo period, 0.02 s by default.")]
+Config = Annotated[
+    Path | None, typer.Option(metavar="FILE.toml", help="Its section beats the preset's.")
 ]
 ToolCheck = Annotated[
     float | None,

@@ -8,6 +8,7 @@ import typer
 from dmpcli.commands.messages import tell, warn
 from dmpcli.commands.options import (
     AllowMixed,
+    Config,
     FollowingError,
     MaxForce,
     MaxTorque,
@@ -44,7 +45,7 @@ def command(
     preset: Annotated[
         str, typer.Option(metavar="NAME|FILE.toml", help="drag, paper, or your own.")
     ] = "drag",
-    config: Annotated[Path | None, typer.Option(help="TOML that beats the preset.")] = None,
+    config: Config = None,
     duration: Annotated[float | None, typer.Option(help="End after so many s.")] = None,
     until_rest: Annotated[
         float | None, typer.Option(help="End once the tool has moved and rested for so many s.")
@@ -248,12 +249,11 @@ def _recording(
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     from dataclasses import replace
 
-    from dmpcli.instruments.protocols import VIRTUAL
     from dmpcli.records.record import Record
     from dmpcli.records.schemas import DEMONSTRATION
 
     facts = known.facts | {"ended": ending.reason} | (recorder.pace.facts() if realtime else {})
-    if recorder.sensor_info.serial == VIRTUAL:  # of a lab that `simulate` serves
+    if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 

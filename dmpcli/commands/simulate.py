@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dmpcli.commands.messages import tell, warn
-from dmpcli.commands.options import Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import Config, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def command(
     preset: Annotated[
         str, typer.Option(metavar="NAME|FILE.toml", help="[record]: what the hand has practised.")
     ] = "drag",
-    config: Annotated[Path | None, typer.Option(help="TOML that beats the preset.")] = None,
+    config: Config = None,
     duration: Annotated[
         float | None, typer.Option(help="Of the hand's stroke with its rests, s.")
     ] = None,

@@ -14,7 +14,7 @@ RobotMode = Literal["ready", "stopped", "emergency stop", "protective stop", "fa
 
 
 VIRTUAL = "virtual"
-"""Serial number of a simulated box, by which a recording knows it over the wire."""
+"""Serial number of a simulated box, by which files tell it over the wire."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,11 @@ class SensorInfo:
     def identity(self) -> str:
         """All that tells this sensor from another one."""
         return " ".join(part for part in (self.make, self.product, self.serial) if part)
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it belongs to a lab that ``dmpcli simulate`` serves."""
+        return self.serial == VIRTUAL
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ class Sensing:
 
     Attributes
     ----------
+    info : SensorInfo
     newest : Sample
         The last one heard, as sensed.
     """
@@ -49,7 +50,7 @@ class Sensing:
     def __init__(
         self, sensor: Sensor, info: SensorInfo, rate: float, period: float, clock: Clock
     ) -> None:
-        self._sensor, self._info, self._clock = sensor, info, clock
+        self._sensor, self.info, self._clock = sensor, info, clock
         self._limit = RANGE_SHARE * info.limit
         self._stale = STALE * max(period, 1.0 / rate)
         self.newest = Sample(clock.now(), 0, np.zeros(6), healthy=True, lost=0)
@@ -101,7 +102,7 @@ class Sensing:
         if tolerance is None:
             self.first(SILENCE)
             return tool
-        _check_sensor(tool, self._info)
+        _check_sensor(tool, self.info)
         samples = self.first(SILENCE)
         _check_rest(tool, np.array([s.wrench for s in samples]), rotation, tolerance)
         return tool

@@ -187,6 +187,11 @@ class Loop:
         return Outcome(reason, None, number)
 
     @property
+    def virtual(self) -> bool:
+        """Whether what it feels with belongs to a lab that ``dmpcli simulate`` serves."""
+        return self._touch is not None and self._touch.sensing.info.virtual
+
+    @property
     def pressing(self) -> Pressing | None:
         """The force coupling, where there is one."""
         return self._pressing

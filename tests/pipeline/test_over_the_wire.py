@@ -157,6 +157,7 @@ def test_the_run_follows_the_trajectory_and_draws_its_wave(folder, heights):
     run = read(folder / "run.parquet", schemas.RUN)
     assert run.provenance.facts["reason"] == "done"
     assert run.provenance.facts["completed"] is True
+    assert run.provenance.facts["simulated"] is True
     trajectory = read(folder / "traj.parquet", schemas.TRAJECTORY).position()
     actual = run.position()
     # The arm ends where the trajectory does, and every point of it was passed.
