@@ -141,7 +141,9 @@ def execution(period: float, duration: float, folder: Path, at: Place) -> Measur
     t = np.arange(round(duration * 100.0) + 1) / 100.0
     s = t / t[-1]
     u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    wave = np.column_stack([-109.0 * u, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
+    # There and back: the next block begins where this one did.
+    away = np.sin(np.pi * u) ** 2
+    wave = np.column_stack([-109.0 * away, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
     stroke = planning.Stroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
     clock = Metered()
     bench = at.connect(clock, session.scene(stroke, presses=False))

@@ -89,6 +89,20 @@ def finite(*arrays: Floats) -> bool:
     return True
 
 
+def within(values: Floats, limits: Floats) -> bool:
+    """Tell whether every |value| is below its limit; in plain floats, as `finite`.
+
+    Parameters
+    ----------
+    values, limits : array, shape (n,)
+    """
+    pairs = zip(values.tolist(), limits.tolist(), strict=True)
+    for value, limit in pairs:  # noqa: SIM110 (a generator would take as long again)
+        if not -limit < value < limit:
+            return False
+    return True
+
+
 def check_inside(position: Floats, box: Box | None, what: str) -> None:
     """Refuse a position outside the workspace.
 

@@ -51,7 +51,8 @@ class Sensing:
         self, sensor: Sensor, info: SensorInfo, rate: float, period: float, clock: Clock
     ) -> None:
         self._sensor, self.info, self._clock = sensor, info, clock
-        self._limit = RANGE_SHARE * info.limit
+        # A reading at the share itself is allowed.
+        self._limit = np.nextafter(RANGE_SHARE * info.limit, np.inf)
         self._stale = STALE * max(period, 1.0 / rate)
         self.newest = Sample(clock.now(), 0, np.zeros(6), healthy=True, lost=0)
 
@@ -167,9 +168,8 @@ class Sensing:
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is not a number, stopped; check its driver"
             )
-        over = np.abs(sample.wrench) > self._limit
-        if over.any():
-            axis = int(np.argmax(over))
+        if not guards.within(sample.wrench, self._limit):
+            axis = int(np.argmax(np.abs(sample.wrench) >= self._limit))
             raise InstrumentError(
                 f"force sensor: {_AXES[axis]} = {sample.wrench[axis]:.3g} is over "
                 f"{RANGE_SHARE:.0%} of its range, stopped; use less force"

@@ -196,5 +196,8 @@ class Touch:
         samples = self.sensing.recent(now)
         if not samples:
             return None
-        sensed = np.mean([sample.wrench for sample in samples], axis=0)
-        return self.compensate(sensed, state.rotation)
+        # Not np.mean, which takes ten times as long for one or two.
+        sensed = samples[0].wrench
+        for sample in samples[1:]:
+            sensed = sensed + sample.wrench
+        return self.compensate(sensed / len(samples), state.rotation)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.instruments import guards
 from dmpcli.instruments.netft import protocol
 from dmpcli.instruments.netft.mailbox import Letter
 from dmpcli.instruments.netft.sequence import Sequence, Verdict
@@ -144,22 +145,16 @@ class Stream:
             self.fault = f"{self._senseless} malformed datagrams in a row, {why}"
 
     def _read(self, records: protocol.Records, arrived: float, samples: list[Sample]) -> None:
-        numbers = zip(
-            records["rdt_sequence"].tolist(),
-            records["ft_sequence"].tolist(),
-            records["status"].tolist(),
-            records["counts"] * self.per_count,
-            strict=True,
-        )
         # A buffered datagram's last record is new; the others are a period older each.
         age = (len(records) - 1) / self.rate
-        for rdt_sequence, ft_sequence, status, wrench in numbers:
+        for rdt_sequence, ft_sequence, status, counts in records.tolist():
             verdict = self.sequence.judge(rdt_sequence, ft_sequence)
             if verdict is Verdict.TAKEN:
                 self._senseless, self._dropped = 0, ""
                 self.heard = arrived
                 # No two samples have one time, also where a burst came at once.
                 self._newest = max(arrived - age, math.nextafter(self._newest, math.inf))
+                wrench = np.array(counts) * self.per_count
                 reason = self._unhealthy(status, wrench)
                 lost = self.sequence.lost
                 samples.append(Sample(self._newest, rdt_sequence, wrench, not reason, lost, reason))
@@ -181,10 +176,9 @@ class Stream:
         if serious(status):
             return describe(status, self.family)
         self.tally.warnings += bool(status)
-        inside = np.abs(wrench) < self.limit
-        if inside.all():
+        if guards.within(wrench, self.limit):
             return ""
-        axis = int(np.argmin(inside))
+        axis = int(np.argmin(np.abs(wrench) < self.limit))
         return (
             f"{_AXES[axis]} = {wrench[axis]:.4g} is not within the measuring range, "
             f"±{self.limit[axis]:g}"
