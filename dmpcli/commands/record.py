@@ -169,9 +169,11 @@ def command(
                 keeper.keep(_recording(recorder, provenance, ending, realtime), ending.failure)
             else:
                 keeper.drop()
-    if realtime:
-        tell(str(recorder.pace), quiet)
-    tell(_summary(output, recorder, ending), quiet)
+    # What was refused before the first row is one line.
+    if len(recorder.log) or ending.failure is None:
+        if realtime:
+            tell(str(recorder.pace), quiet)
+        tell(_summary(output, recorder, ending), quiet)
     if ending.failure is not None:
         raise ending.failure
     if signals.number is not None:

@@ -121,6 +121,19 @@ def test_a_robot_that_must_not_move_is_refused_in_one_line(command, monitor, wor
     assert "--robot elite://127.0.0.1" in result.stderr.splitlines()[0]  # there is no --tool
 
 
+def test_a_recording_that_never_began_is_not_summed_up(tmp_path):
+    out = tmp_path / "out.parquet"
+    with Scripted() as robot:
+        robot.pose = flange_at(HOME)
+        robot.answers |= {"inverseKinematic": robot.solve, "getRobotMode": 0}
+        url = f"elite://{robot.query}"
+        result = dmpcli("record", "-o", out, "--robot", url, "--allow-mixed", expect=3)
+    assert "in teach mode; turn the key to remote" in last_line(result)
+    assert "rows" not in result.stderr
+    assert "no cycle" not in result.stderr
+    assert not out.exists()
+
+
 def test_an_instrument_beside_a_mock_one_must_be_meant(tmp_path):
     out = tmp_path / "out.parquet"
     result = dmpcli("record", "-o", out, "--robot", "elite://127.0.0.1", expect=2)
