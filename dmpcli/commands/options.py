@@ -46,6 +46,9 @@ ToolCheck = Annotated[
     float | None,
     typer.Option(metavar="N", help="What the tool file may miss of the reading at rest (1.5)."),
 ]
+DrawnEnd = Annotated[Point | None, typer.Option(metavar="X Y Z", help="Of it, mm.")]
+WaveHeight = Annotated[float | None, typer.Option(help="Of the sine, peak to trough, mm.")]
+Periods = Annotated[float | None, typer.Option(help="Of the sine.")]
 SurfacePose = Annotated[
     str | None,
     typer.Option(

@@ -9,14 +9,17 @@ from dmpcli.commands.messages import tell, warn
 from dmpcli.commands.options import (
     AllowMixed,
     Config,
+    DrawnEnd,
     FollowingError,
     MaxForce,
     MaxTorque,
+    Periods,
     Quiet,
     Realtime,
     Robot,
     Sensor,
     ToolCheck,
+    WaveHeight,
     Workspace,
 )
 from dmpcli.errors import InputError
@@ -55,16 +58,10 @@ def command(
         str | None,
         typer.Option(metavar="sine|line|circle|FILE.csv", help="What the mock tutor draws."),
     ] = None,
-    start: Annotated[
-        tuple[float, float, float] | None, typer.Option(metavar="X Y Z", help="Of it, mm.")
-    ] = None,
-    goal: Annotated[
-        tuple[float, float, float] | None, typer.Option(metavar="X Y Z", help="Of it, mm.")
-    ] = None,
-    wave_height: Annotated[
-        float | None, typer.Option(help="Of the sine, peak to trough, mm.")
-    ] = None,
-    periods: Annotated[float | None, typer.Option(help="Of the sine.")] = None,
+    start: DrawnEnd = None,
+    goal: DrawnEnd = None,
+    wave_height: WaveHeight = None,
+    periods: Periods = None,
     following_error: FollowingError = None,
     tool_check: ToolCheck = None,
     max_force: MaxForce = None,
@@ -111,9 +108,9 @@ def command(
     settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
     addresses = urls.check(robot, sensor, allow_mixed)
-    _check_tutored(given, urls.repeatable(addresses))
-    urls.need_tool(addresses[1], tool is not None)
     repeatable = urls.repeatable(addresses)
+    _check_tutored(given, repeatable)
+    urls.need_tool(addresses[1], tool is not None)
     realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dmpcli.commands.messages import tell, warn
-from dmpcli.commands.options import Config, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import (
+    Config,
+    DrawnEnd,
+    Periods,
+    Quiet,
+    SurfacePose,
+    SurfaceUnit,
+    WaveHeight,
+)
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
@@ -81,12 +89,10 @@ def command(
         str | None,
         typer.Option(metavar="sine|line|circle|FILE.csv", help="What the hand draws."),
     ] = None,
-    start: Annotated[Point | None, typer.Option(metavar="X Y Z", help="Of it, mm.")] = None,
-    goal: Annotated[Point | None, typer.Option(metavar="X Y Z", help="Of it, mm.")] = None,
-    wave_height: Annotated[
-        float | None, typer.Option(help="Of the sine, peak to trough, mm.")
-    ] = None,
-    periods: Annotated[float | None, typer.Option(help="Of the sine.")] = None,
+    start: DrawnEnd = None,
+    goal: DrawnEnd = None,
+    wave_height: WaveHeight = None,
+    periods: Periods = None,
     quiet: Quiet = False,
 ) -> None:
     """Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C."""
