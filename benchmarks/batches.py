@@ -339,18 +339,19 @@ def against_dask(place: Path) -> None:
 
 
 def bad_rows(place: Path) -> None:
-    """Print what becomes of a table with 1 % bad rows on a plane."""
-    rows = level_pairs(MANY)
-    bad = np.arange(50, MANY, 100)
-    rows[bad[0::3], 1] = np.nan
-    rows[bad[1::3], 3:] = rows[bad[1::3], :3]
-    rows[bad[2::3], 2] += 30.0
-    table, folder = table_of(place, rows, "bad"), place / "batch"
-    plane = place / "plane.json"
+    """Print what becomes of tables with 1 % bad rows on a plane: all three kinds, and one alone."""
+    folder, plane = place / "batch", place / "plane.json"
     plane.write_text(PLANE)
+    bad = np.arange(50, MANY, 100)
     print(f"| {MANY} pairs, {len(bad)} of them bad | exit | strokes | rows named | last words |")
     print("| --- | ---: | ---: | ---: | --- |")
-    for mode in ("skip", "stop"):
+    for kind, mode in (("all", "skip"), *((kind, "stop") for kind in ("all", *BAD))):
+        rows = level_pairs(MANY)
+        for i, (name, spoil) in enumerate(BAD.items()):
+            which = bad[i::3] if kind == "all" else bad
+            if kind in ("all", name):
+                rows[which] = spoil(rows[which])
+        table = table_of(place, rows, f"bad-{kind.replace(' ', '-')}")
         options = ("--surface", plane, "--jobs", 2, "--on-error", mode)
         done = subprocess.run(command(place, table, folder, *options), stderr=subprocess.PIPE)
         named = drawn = 0
@@ -359,10 +360,15 @@ def bad_rows(place: Path) -> None:
             named = int(np.sum([status[row] != "ok" and "line" in status[row] for row in bad]))
             drawn = status.count("ok")
         last = done.stderr.decode().strip().splitlines()[-1].replace(f"{place}/", "")
-        print(f"| --on-error {mode} | {done.returncode} | {drawn} | {named} | {last} |")
+        print(f"| {kind}, --on-error {mode} | {done.returncode} | {drawn} | {named} | {last} |")
         shutil.rmtree(folder, ignore_errors=True)
 
 
+BAD: dict[str, Callable[[Floats], Floats]] = {
+    "not a number": lambda rows: np.where(np.arange(6) == 1, np.nan, rows),
+    "start is goal": lambda rows: np.hstack([rows[:, :3], rows[:, :3]]),
+    "off the plane": lambda rows: rows + np.array([0.0, 0.0, 30.0, 0.0, 0.0, 0.0]),
+}
 PLANE = '{"point": [0, 0, -17.5], "normal": [0, 0, 1]}'
 
 
