@@ -221,7 +221,7 @@ def _outcome(
             continue
         if len(stroke.position) < len(before.position):
             clipped[row] = float(stroke.timing.t[-1])
-        unfolded += stroke.unfolded
+        unfolded += 1 if stroke.unfolded else 0
     return Outcome(part.number, failed, clipped, unfolded, fatal=fatal)
 
 

@@ -129,7 +129,8 @@ def legend(figure: Figure, curves: Sequence[Curve], columns: int) -> None:
 
 def legend_rows(curves: Sequence[Curve], columns: int) -> int:
     """Rows that the legend takes."""
-    return -(-(len(curves) + _marked(curves)) // columns)
+    entries = len(curves) + (1 if _marked(curves) else 0)
+    return -(-entries // columns)
 
 
 def _marked(curves: Sequence[Curve]) -> bool:

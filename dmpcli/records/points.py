@@ -122,7 +122,7 @@ class PairFile(PointFile):
         else:
             self._lines.append(f"{self.count // 2 + 1},{cells}{self._empty}")
         self.count += 1
-        self._write(len(self._lines) - self.open)
+        self._write(len(self._lines) - (1 if self.open else 0))
 
     def close(self) -> None:
         """Keep a last start without its goal, which a pipe has not got yet."""

@@ -85,7 +85,7 @@ class Playback(Loop):
     def _wait(self, begin: float, number: int) -> Cycle:
         """Wait for a deadline, and go on in the plan to where it is by then, as the arm has."""
         cycle = super()._wait(begin, number)
-        for _ in range(cycle.missed + (self._trail.last is not None)):
+        for _ in range(cycle.missed + (0 if self._trail.last is None else 1)):
             super()._advance()
             self._look_ahead()
         late = cycle.late - cycle.missed * self.plan.period

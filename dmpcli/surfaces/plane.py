@@ -127,8 +127,9 @@ class PlaneCharts:
     @property
     def status(self) -> Integers:
         """`Status` of each pair, shape (B,)."""
-        met = ~self.closed & (self.lengths <= 0.0)
-        return np.where(met, Status.COINCIDENT, Status.DRAWN)
+        if self.closed:
+            return np.full(len(self), Status.DRAWN)
+        return np.where(self.lengths <= 0.0, Status.COINCIDENT, Status.DRAWN)
 
     def coordinates(self, position: Floats) -> Floats:
         """Chart coordinates (B, T, 3) of positions (B, T, 3), mm."""

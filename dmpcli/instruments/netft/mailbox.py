@@ -112,7 +112,7 @@ class Mailbox:
                 continue
             arrived = self._clock.now() - _age(extra)
             self._last = max(arrived, self._last)
-            self.dropped += len(self._letters) == self._letters.maxlen
+            self.dropped += 1 if len(self._letters) == self._letters.maxlen else 0
             self._letters.append(Letter(self._last, source, content))
 
 

@@ -175,7 +175,7 @@ class Stream:
         """Say why a reading must not be believed; empty where it may."""
         if serious(status):
             return describe(status, self.family)
-        self.tally.warnings += bool(status)
+        self.tally.warnings += 1 if status else 0
         if guards.within(wrench, self.limit):
             return ""
         axis = int(np.argmin(np.abs(wrench) < self.limit))
