@@ -3,46 +3,94 @@
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
+#   make test-quick  the quick half of the tests
+#   make test-lowest the same with the lowest versions that pyproject.toml allows
+#   make dist        sdist and wheel, checked, and the wheel tried in an environment without extras
+#   make lock        the lock files, from pyproject.toml
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
 #   make soak        200 recordings killed at random: what is lost
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
-# Each sets up what it needs in .venv first.
+# Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
 
 PYTHON ?= python3
-BIN    := .venv/bin
+VENV   ?= .venv
+OUT    ?= out
+LOCK   ?= requirements.lock
+BIN    := $(VENV)/bin
 DMPCLI := $(BIN)/dmpcli
-OUT    := out
+CACHE  := $(OUT)/cache
+
+ifneq ($(words $(VENV) $(OUT)),2)
+$(error VENV and OUT may not have spaces in their names: make cannot tell them from two)
+endif
+
+# A shell that was set up for something else (ROS, for one) would mix its packages into ours.
+unexport PYTHONPATH PYTHONHOME
+export RUFF_CACHE_DIR := $(CACHE)/ruff
+export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test lint bench peers soak cluster-demo samples pictures schemas clean
+.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak cluster-demo \
+    samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
 
-# The environment, from pinned versions.
+# The environment, from pinned versions. What it was made with is looked at each time: PYTHON may
+# have changed, and time stamps say nothing about that.
 
-.venv/installed: requirements.lock pyproject.toml
-	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --editable .
-	touch $@
+$(VENV)/installed: FORCE
+	@sh tools/set_up.sh "$(PYTHON)" "$(VENV)" "$(LOCK)" "$(OUT)"
 
-# Tests.
+# Tests. The quick half leaves out what is marked slow.
 
-test: .venv/installed lint
-	$(BIN)/pytest --numprocesses auto --dist worksteal
+PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses auto --dist worksteal
 
-lint: .venv/installed
+test: $(VENV)/installed lint
+	$(PYTEST)
+
+test-quick: $(VENV)/installed
+	$(PYTEST) -m "not slow"
+
+# The lowest versions that pyproject.toml allows.
+test-lowest:
+	$(MAKE) --no-print-directory test-quick VENV=$(OUT)/lowest/venv LOCK=requirements-lowest.lock
+
+lint: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --cache-dir $(CACHE)/import-linter
+
+# The lock files, each for every Python from 3.11 on; UPGRADE=--upgrade takes the newest versions.
+
+UV := $(OUT)/lock/bin/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
+    --no-annotate --custom-compile-command "make lock"
+
+lock:
+	$(PYTHON) -m venv $(OUT)/lock
+	$(OUT)/lock/bin/python -m pip install --quiet --disable-pip-version-check uv==0.13.9
+	$(UV) pyproject.toml --extra test -o requirements.lock $(UPGRADE)
+	$(UV) pyproject.toml --extra test -o requirements-lowest.lock --resolution lowest-direct --upgrade
+	$(UV) --group dist -o requirements-dist.lock $(UPGRADE)
+
+# What is handed out: built from one another, checked, and the wheel tried without extras.
+
+DIST := $(OUT)/dist
+
+dist:
+	@sh tools/set_up.sh "$(PYTHON)" "$(DIST)/tools" requirements-dist.lock "$(OUT)" bare
+	rm -rf $(DIST)/files
+	SOURCE_DATE_EPOCH=946684800 $(DIST)/tools/bin/python -m build --no-isolation --outdir $(DIST)/files . > $(DIST)/build.log
+	$(DIST)/tools/bin/python -m twine check --strict $(DIST)/files/*
+	$(DIST)/tools/bin/python -m check_wheel_contents $(DIST)/files/*.whl
+	$(DIST)/tools/bin/python tools/check_wheel.py $(DIST)/files/*.whl $(DIST)/bare requirements.lock
 
 bench: export OPENBLAS_NUM_THREADS := 1
-bench: .venv/installed
+bench: $(VENV)/installed
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python benchmarks/human_strokes.py
@@ -52,7 +100,7 @@ bench: .venv/installed
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
 
-soak: .venv/installed
+soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
@@ -73,14 +121,14 @@ peers: $(PEERS)/installed
 
 # A batch on two workers, one of which is killed on the way.
 
-cluster-demo: .venv/installed
+cluster-demo: $(VENV)/installed
 	$(BIN)/python benchmarks/cluster_demo.py $(OUT)/cluster
 
 # One stroke through the whole tool-chain, against the mock lab.
 
 DEMO := $(OUT)/demo
 
-demo: .venv/installed
+demo: $(VENV)/installed
 	@mkdir -p $(DEMO)
 	$(DMPCLI) record -o $(DEMO)/demonstration.parquet --seed 1
 	$(DMPCLI) fit $(DEMO)/demonstration.parquet -o $(DEMO)/skill.json
@@ -125,7 +173,7 @@ reproduce: $(REPORTS) $(STROKES:%=$(R)/%/tables.txt) $(R)/drag/report/report.jso
 	@cat $(R)/drag/tables.txt
 
 define FIT_RULES
-$(R)/$(1)/$(2).json: sample_runs/$(1).parquet | .venv/installed
+$(R)/$(1)/$(2).json: sample_runs/$(1).parquet | $(VENV)/installed
 	@mkdir -p $$(@D)
 	$(DMPCLI) fit $$< -o $$@ $(FIT_$(2))
 $(R)/$(1)/$(2)-table1.parquet: $(R)/$(1)/$(2).json
@@ -151,7 +199,7 @@ $(R)/$(1)/curved/report.json $(R)/$(1)/curved.txt &: sample_runs/$(1).parquet \
 endef
 $(foreach stroke,$(STROKES),$(eval $(call REPORT_RULE,$(stroke))))
 
-$(R)/drag/builtin.parquet: sample_runs/recorded.toml | .venv/installed
+$(R)/drag/builtin.parquet: sample_runs/recorded.toml | $(VENV)/installed
 	@mkdir -p $(@D)
 	$(DMPCLI) record -o $@ --config $< --drag builtin --seed 1
 $(R)/drag/report/report.json $(R)/drag/tables.txt &: sample_runs/recorded.parquet \
@@ -173,12 +221,12 @@ pictures: reproduce
 
 # The sample runs are kept in the repository; this makes them again, byte for byte.
 
-samples: .venv/installed
+samples: $(VENV)/installed
 	$(BIN)/python sample_runs/make_reference.py sample_runs/reference.parquet
 	$(BIN)/python sample_runs/make_surfaces.py sample_runs
 	$(DMPCLI) record -o sample_runs/recorded.parquet --config sample_runs/recorded.toml --seed 1
 
-schemas: .venv/installed
+schemas: $(VENV)/installed
 	$(BIN)/python -m dmpcli.records.publish
 
 clean:

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import scipy
 
-from dmpcli import __version__
+from dmpcli import __version__, extras
 from dmpcli.batch.job import Job, Outcome, Part, draw_part
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import DmpError, InputError, InstrumentError
@@ -43,11 +43,7 @@ def workers(address: str) -> Draw:
     InstrumentError
         Nobody answers there, or there are no workers.
     """
-    try:
-        import distributed
-        import threadpoolctl  # noqa: F401
-    except ImportError:
-        raise InputError("--cluster: needs Dask; pip install 'dmpcli[dask]'") from None
+    distributed, _ = extras.load(extras.DASK, "--cluster", "distributed", "threadpoolctl")
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -11,7 +11,6 @@ compensation of a tool expects.
 """
 
 import contextlib
-import importlib
 import socket
 import struct
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from dmpcli import extras
 from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import sockets
@@ -336,9 +336,4 @@ def _package(name: str) -> Any:
     ------
     InputError
     """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise InputError(
-            f"--robot ur: needs ur-rtde, which is not installed: pip install 'dmpcli[ur]' ({error})"
-        ) from None
+    return extras.load(extras.UR, "--robot ur", name)[0]

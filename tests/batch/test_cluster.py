@@ -14,6 +14,8 @@ from dmpcli.batch import cluster
 from dmpcli.errors import InputError, InstrumentError
 from tests.batch.test_run import DMPCLI, content, learned, write_pairs
 
+pytestmark = pytest.mark.slow
+
 BIN = Path(sys.executable).parent
 
 __all__ = ["learned"]

@@ -92,6 +92,7 @@ def test_the_number_of_processes_does_not_change_a_byte(learned, whole, tmp_path
     assert content(tmp_path / "b") == files
 
 
+@pytest.mark.slow
 def test_shards_leave_the_table_and_manifest_to_the_last_run(learned, whole, tmp_path):
     table, files = whole
     for shard in ("2/3", "3/3", "1/3"):
@@ -103,6 +104,7 @@ def test_shards_leave_the_table_and_manifest_to_the_last_run(learned, whole, tmp
     assert content(tmp_path / "b") == files
 
 
+@pytest.mark.slow
 def test_a_shard_leaves_alone_what_another_one_is_writing(learned, whole, tmp_path):
     table, files = whole
     folder = tmp_path / "b"
@@ -146,6 +148,7 @@ def test_parts_of_other_options_are_not_kept(learned, whole, tmp_path, other):
     assert content(folder)["part-00000.parquet"] != files["part-00000.parquet"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_stopped_run_keeps_finished_parts_and_no_manifest(learned, tmp_path, jobs, number, code):

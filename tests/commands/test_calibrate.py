@@ -253,6 +253,7 @@ def test_by_hand_a_refused_set_that_is_not_kept_is_told_to_be_lost(tmp_path):
     assert "; 1 pose not kept: --save POSES keeps them" in one.said
 
 
+@pytest.mark.slow
 def test_ctrl_c_decelerates_and_ends_with_its_exit_code(tmp_path):
     command = [DMPCLI, "calibrate", "-o", "tool.json", "--realtime"]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)

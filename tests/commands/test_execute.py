@@ -341,6 +341,7 @@ def short(tmp_path_factory):
     return written(tmp_path_factory.mktemp("short") / "traj.parquet", columns(duration=2.0))
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(option=st.sampled_from(sorted(NUMBERS)), data=st.data())
 def test_no_finite_number_ends_in_a_traceback(short, option, data):
@@ -499,6 +500,7 @@ def after(process, seconds, number):
     process.send_signal(number)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_decelerates_and_keeps_the_run(traj, tmp_path, number, code):
     out = tmp_path / "run.parquet"
@@ -522,6 +524,7 @@ def test_a_signal_decelerates_and_keeps_the_run(traj, tmp_path, number, code):
     assert f"{out}: {len(run)} rows kept" in errors
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_stops_at_once(traj, tmp_path):
     out = tmp_path / "run.parquet"
     process = started(traj, "-o", out, *REALTIME)
@@ -544,6 +547,7 @@ def test_the_command_line_loads_no_heavy_library():
     assert json.loads(done.stdout) == []
 
 
+@pytest.mark.slow
 def test_running_loads_no_scipy(traj, tmp_path):
     code = (
         "import sys; from dmpcli.cli import app;"

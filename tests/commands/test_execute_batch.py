@@ -272,6 +272,7 @@ def test_an_arm_that_stands_on_the_work_is_led_over_it_when_asked(batch, tmp_pat
     assert speed.max() <= 30.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_tenth_of_the_speed_slows_strokes_and_ways(batch, tmp_path):
     fast, slow = tmp_path / "fast", tmp_path / "slow"
     execute(batch, "-o", fast, "--id", "a", "--id", "b")
@@ -323,6 +324,7 @@ def test_a_dry_run_tells_a_line_per_stroke_and_of_many_the_worst(batch, tmp_path
 # --- pressing
 
 
+@pytest.mark.slow
 def test_the_coupling_presses_during_strokes_only(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out, "--coupling", "force", "--force-setpoint", 5)
@@ -373,6 +375,7 @@ def test_after_an_emergency_stop_the_rest_is_named_and_can_be_drawn(batch, tmp_p
     assert run_of(rest).provenance.facts["drawn"] == ["c", "d"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_the_air_decelerates_on_the_path_and_the_rest_is_named(tmp_path):
     """In real time, in a process of its own; the signal comes where the simulated run was."""
     batch, out = made(tmp_path / "batch", seconds=1.5), tmp_path / "run.parquet"
@@ -411,6 +414,7 @@ def test_ctrl_c_in_the_air_decelerates_on_the_path_and_the_rest_is_named(tmp_pat
 # --- report
 
 
+@pytest.mark.slow
 def test_report_measures_each_stroke_of_a_run(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out)

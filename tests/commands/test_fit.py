@@ -111,6 +111,7 @@ def test_outputs_and_inputs_that_cannot_be_are_refused(recording, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["demo.csv"]
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     row=st.integers(0, 60),
@@ -128,6 +129,7 @@ def test_any_bad_cell_is_refused_with_its_line_and_column(tmp_path, row, column,
     assert not (tmp_path / "s.json").exists()
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(order=st.permutations(range(12)))
 def test_time_that_repeats_or_runs_backward_is_refused(tmp_path, order):
@@ -144,6 +146,7 @@ def test_time_that_repeats_or_runs_backward_is_refused(tmp_path, order):
 NUMBERS = ["--basis", "--damping", "--tau", "--alpha-1", "--cutoff"]
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(option=st.sampled_from(NUMBERS), value=st.floats() | st.integers(-(10**9), 10**9))
 def test_any_number_fits_or_is_refused_in_a_line(recording, tmp_path, option, value):

@@ -246,6 +246,7 @@ def test_what_is_no_skill_is_refused(tmp_path, content):
 number = st.floats(-1e4, 1e4) | st.floats() | st.just(0.0)
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(start=st.tuples(number, number, number), goal=st.tuples(number, number, number))
 def test_any_pair_is_drawn_finite_or_refused_in_one_line(learned, tmp_path, start, goal):

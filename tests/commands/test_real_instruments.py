@@ -142,6 +142,7 @@ def test_an_instrument_beside_a_mock_one_must_be_meant(tmp_path):
     assert "a sensor is one of mock:, netft://HOST" in last_line(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["stream", "file"])
 def test_a_stroke_is_drawn_by_the_virtual_arm_and_logged(mode, traj, pen, tmp_path):
     out = tmp_path / "run.parquet"

@@ -136,6 +136,7 @@ def test_each_wave_is_listed_where_there_are_several(tmp_path):
     assert re.search(r"three +(20\.000 *){5}", dmpcli(path).stdout)
 
 
+@pytest.mark.slow
 def test_the_folder_holds_json_csv_and_figures_and_is_the_same_twice(tmp_path, files):
     result = dmpcli(*files.values(), "-o", tmp_path / "deep" / "out", "-q")
     assert result.exit_code == 0
@@ -243,6 +244,7 @@ def curved(tmp_path, files):
     }
 
 
+@pytest.mark.slow
 def test_on_a_mesh_modified_and_original_stand_side_by_side(tmp_path, curved):
     *strokes, mesh = curved.values()
     report = document(*strokes, "--surface", mesh)

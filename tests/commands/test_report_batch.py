@@ -110,6 +110,7 @@ def test_failures_are_counted_by_reason(demo, folder):
     assert max(map(len, text.splitlines())) <= 80
 
 
+@pytest.mark.slow
 def test_the_folder_holds_a_row_per_stroke_a_row_per_height_and_figures(tmp_path, demo, folder):
     out = tmp_path / "out"
     assert dmpcli(demo, folder, "-o", out, "-q").exit_code == 0

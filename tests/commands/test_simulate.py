@@ -152,6 +152,7 @@ def test_a_start_out_of_reach_is_refused():
     assert "out of reach" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_host_that_is_not_this_computers_is_refused():
     for host in ("300.1.1.1", "192.0.2.1", "a..b"):
         done = run("simulate", *FREE_PORTS, "--host", host)

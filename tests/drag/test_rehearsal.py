@@ -49,6 +49,7 @@ def test_the_same_seed_draws_the_same_and_another_another():
     assert np.abs(one - other).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_the_built_in_drag_is_further_off_and_rougher_for_the_same_hand():
     for seed in range(3):
         stroke, ours, _ = rehearse(seed=seed)

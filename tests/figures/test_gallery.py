@@ -51,6 +51,7 @@ def strokes():
     ]
 
 
+@pytest.mark.slow
 def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes):
     files = gallery.gallery(strokes)
     names = {name.rsplit(".", 1)[0] for name in files}
@@ -64,6 +65,7 @@ def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes
     assert gallery.gallery(strokes) == files
 
 
+@pytest.mark.slow
 def test_pictures_open_and_hold_the_styles_of_their_roles(strokes):
     files = gallery.gallery(strokes)
     for name, content in files.items():

@@ -154,6 +154,7 @@ def strokes(ground):
     return placed([reference, modified(), original()], ground, reference)
 
 
+@pytest.mark.slow
 def test_figure_9_is_drawn_the_same_twice(strokes, ground):
     files = gallery.gallery(strokes, ground)
     assert {"fig9_surface.svg", "fig9_surface.png"} <= set(files)

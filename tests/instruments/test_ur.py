@@ -11,12 +11,14 @@ import types
 import numpy as np
 import pytest
 
+from dmpcli import extras
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments import registry, ur
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
 from dmpcli.instruments.conversion import PoseServo
 from dmpcli.rotations import exp
+from tests.extras_here import needs
 from tests.instruments import rtde_server
 
 POSE = [-0.4, 0.1, 0.3, 0.0, 3.0, 0.5]
@@ -411,6 +413,9 @@ class Server:
         self.process.stdout.close()
 
 
+with_ur_rtde = needs(extras.UR)
+
+
 @pytest.fixture
 def server():
     made = Server()
@@ -425,6 +430,7 @@ def until(what, patience=5.0):
         time.sleep(0.01)
 
 
+@with_ur_rtde
 def test_the_real_receive_interface_reads_a_robot_that_speaks_rtde(server, capfd):
     made = at(server.address)
     try:
@@ -450,6 +456,8 @@ def test_the_real_receive_interface_reads_a_robot_that_speaks_rtde(server, capfd
     assert capfd.readouterr().out == ""
 
 
+@pytest.mark.slow
+@with_ur_rtde
 def test_the_real_receive_interface_of_a_robot_that_falls_silent_is_not_believed(server):
     made = at(server.address)
     try:
@@ -462,6 +470,7 @@ def test_the_real_receive_interface_of_a_robot_that_falls_silent_is_not_believed
         made.close()
 
 
+@with_ur_rtde
 def test_the_real_receive_interface_whose_robot_hangs_up_says_so(server):
     made = at(server.address)
     try:
@@ -474,6 +483,7 @@ def test_the_real_receive_interface_whose_robot_hangs_up_says_so(server):
         made.close()
 
 
+@with_ur_rtde
 def test_a_robot_without_a_dashboard_cannot_be_driven_and_says_so(server):
     made = at(server.address)
     try:

@@ -10,6 +10,7 @@ from tests.kinematics import urdf
 EC66 = models.model("ec66")
 
 
+@pytest.mark.slow
 def test_the_chain_is_that_of_the_makers_urdf_in_position_and_orientation():
     q = np.random.default_rng(3).uniform(-2 * np.pi, 2 * np.pi, (100, 6))
     position, rotation = chain.forward(EC66, q)

@@ -11,6 +11,8 @@ from benchmarks import soak
 from dmpcli.records import record, streams
 from tests.pipeline.conftest import DMPCLI
 
+pytestmark = pytest.mark.slow
+
 # Busy machines are late; a robot with a long look-ahead bears it.
 PATIENT = ("--robot", "mock:?lag=0.2", "--following-error", "50")
 

@@ -18,6 +18,8 @@ from dmpcli.records import tool as tool_file
 from dmpcli.records.record import Provenance, Record
 from tests.commands.virtual_lab import DMPCLI, Lab
 
+pytestmark = pytest.mark.slow
+
 START, GOAL = (-551.030, 131.399, -17.560), (-660.021, 130.034, -17.538)
 # Where the pen is parked: the plate lies 0.4 mm over the stroke, the pen 0.1 mm over the plate.
 PARKED = np.add(START, (0.0, 0.0, 0.5))

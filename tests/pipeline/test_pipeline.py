@@ -59,6 +59,7 @@ def test_the_pipe_of_the_readme(tmp_path):
     np.testing.assert_allclose(found.position()[0], [-700, 130, -17.5])
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_through_every_stage(dmpcli, tmp_path):
     for run in ("a", "b"):
         (tmp_path / run).mkdir()
@@ -101,6 +102,7 @@ def fitted(dmpcli, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_tables_1_and_2_reach_the_promised_bounds(dmpcli, fitted):
     paper = ["--preset", "paper"]
     lwr, ridge = fitted("lwr"), fitted("ridge", "--regression", "ridge")
@@ -120,6 +122,7 @@ def test_tables_1_and_2_reach_the_promised_bounds(dmpcli, fitted):
     assert max(lwr["end"], ridge["end"]) <= 0.01
 
 
+@pytest.mark.slow
 def test_an_interrupted_writer_leaves_the_old_file(dmpcli, tmp_path):
     dmpcli("fit", REFERENCE, "-o", "skill.json")
     before = (tmp_path / "skill.json").read_bytes()
@@ -129,6 +132,7 @@ def test_an_interrupted_writer_leaves_the_old_file(dmpcli, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["skill.json"]
 
 
+@pytest.mark.slow
 def test_nothing_but_data_goes_to_standard_output(dmpcli):
     skill = dmpcli("fit", REFERENCE, "-o", "-").stdout
     assert json.loads(skill)["schema"] == "skill"
@@ -158,6 +162,7 @@ def test_every_command_refuses_what_is_no_input_in_a_line_or_two(
     assert [p.name for p in tmp_path.iterdir()] == ["input"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", ["fit demo -o -", "inspect demo", "report demo", "record -o - --duration 2"]
 )
@@ -186,12 +191,14 @@ def test_a_closed_standard_input_is_one_line(tmp_path):
     assert done.stderr.decode() == "dmpcli: standard input: is closed; name a file\n"
 
 
+@pytest.mark.slow
 def test_a_skill_that_is_not_the_stroke_is_said_so_even_when_quiet(dmpcli):
     said = dmpcli("fit", REFERENCE, "-o", "s.json", "--cutoff", "0.02", "-q").stderr.decode()
     assert "smoothing took off much of the stroke" in said
     assert dmpcli("fit", REFERENCE, "-o", "s.json", "-q").stderr == b""
 
 
+@pytest.mark.slow
 def test_a_report_leaves_no_figures_of_an_older_one(dmpcli, tmp_path):
     dmpcli("fit", REFERENCE, "-o", "s.json")
     dmpcli("generalize", "s.json", "-o", "1.parquet", "--reproduce")

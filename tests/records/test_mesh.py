@@ -365,6 +365,7 @@ def test_the_order_of_vertices_and_faces_does_not_change_the_surface(order, seed
     assert_sound(found)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.tuples(*[st.integers(0, 26)] * 3), min_size=1, max_size=14))
 def test_triangles_thrown_on_a_lattice_become_sound_or_are_refused(faces):

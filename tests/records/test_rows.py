@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,6 +24,7 @@ def test_rows_come_back_as_they_were_added_over_the_borders_of_blocks():
     assert rows.words("word", 4095, 4097) == ["w4095", "w4096"]
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 3000), max_size=4))
 def test_adding_many_at_once_is_adding_one_by_one(sizes):
     one, many = filled(sum(sizes)), Rows(GROUPS, ("word",))

@@ -34,6 +34,7 @@ def test_strokes_follow_the_true_strip_as_well_as_the_mesh_allows(name, periods)
     assert np.degrees(np.arccos((skew.min() - 1) / 2)) < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 def test_deviation_shrinks_with_the_square_of_the_edge_length(name):
     coarse, fine = (deviation(name, faces)[-1].max() for faces in (4_000, 36_000))
@@ -245,6 +246,7 @@ def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma)
     assert cases.turns(lift.axes).max() < cases.turns(case.axes).max() + 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [10.0, 25.0, 40.0, 60.0, 90.0])
 def test_folds_of_a_noisy_scan_are_drawn_well_or_refused(degrees):
     sigma, a = 0.1, np.radians(degrees)

@@ -20,6 +20,7 @@ JSON = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(JSON, min_size=1, max_size=4), st.sampled_from([b"", b"\n", b"\r\n"]), st.data())
 def test_replies_are_found_however_the_stream_is_chopped(results, end, data):
     stream = b"".join(reply(result, n, end) for n, result in enumerate(results))

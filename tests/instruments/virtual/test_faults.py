@@ -87,6 +87,7 @@ def test_a_specification_that_is_not_understood_is_named_with_what_would_do(text
     assert str(caught.value).startswith(f"--fault {texts[-1]}")
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(st.text(), st.from_regex(rf"({'|'.join(KINDS)})(=\w*)?(@.*)?"))))
 def test_any_text_is_understood_or_refused(texts):
     try:

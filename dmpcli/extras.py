@@ -1,0 +1,133 @@
+"""The optional packages: what each extra is for, and where its wheels exist.
+
+The one list of them: the message of a command that misses one, README's table, and the tests that
+are passed over where there is no wheel are made from it; pyproject.toml names the same packages.
+"""
+
+import importlib
+import platform
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+from dmpcli.errors import InputError
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """Where a package that is compiled has wheels.
+
+    Attributes
+    ----------
+    newest : tuple of int
+        The last CPython, as (3, 12); the first is the project's own.
+    machines : tuple of str
+        As ``sys.platform`` and ``platform.machine()`` say them: ``"linux x86_64"``.
+    """
+
+    newest: tuple[int, int]
+    machines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Extra:
+    """An optional part of the program.
+
+    Attributes
+    ----------
+    name : str
+        As in ``pip install 'dmpcli[NAME]'``.
+    packages : tuple of str
+        What it installs, as pyproject.toml names it.
+    purpose : str
+        What it is for.
+    wheels : Wheels, optional
+        Where it has wheels; everywhere without.
+    """
+
+    name: str
+    packages: tuple[str, ...]
+    purpose: str
+    wheels: Wheels | None = None
+
+    @property
+    def install(self) -> str:
+        """The line that installs it."""
+        return f"pip install 'dmpcli[{self.name}]'"
+
+    def has_wheel(self, python: tuple[int, int], machine: str) -> bool:
+        """Tell whether it can be installed without a compiler there, see `Wheels`."""
+        wheels = self.wheels
+        return wheels is None or (python <= wheels.newest and machine in wheels.machines)
+
+
+UR = Extra(
+    "ur",
+    ("ur-rtde",),
+    "`ur://`, Universal Robots' arms",
+    Wheels((3, 12), ("linux x86_64", "linux i686", "win32 AMD64")),
+)
+DASK = Extra("dask", ("dask", "distributed", "threadpoolctl"), "`generalize --cluster`")
+EXTRAS = (UR, DASK)
+
+_MACHINES = {
+    "linux x86_64": "Linux x86-64",
+    "linux i686": "Linux i686",
+    "win32 AMD64": "Windows x86-64",
+}
+
+
+def here() -> tuple[tuple[int, int], str]:
+    """Return this Python and this machine, see `Wheels`."""
+    return sys.version_info[:2], f"{sys.platform} {platform.machine()}"
+
+
+def python_here() -> str:
+    """Return this Python and this machine in words."""
+    return f"{platform.python_implementation()} {platform.python_version()} on {here()[1]}"
+
+
+def load(extra: Extra, option: str, *modules: str) -> list[Any]:
+    """Import modules of an extra.
+
+    Parameters
+    ----------
+    extra : Extra
+    option : str
+        What needs it, as the command line says it: ``--cluster``.
+    *modules : str
+
+    Raises
+    ------
+    InputError
+        One is not there; it says how to install the extra, and where it can't be.
+    """
+    try:
+        return [importlib.import_module(module) for module in modules]
+    except ImportError as error:
+        raise InputError(missing(extra, option, str(error))) from None
+
+
+def missing(extra: Extra, option: str, why: str) -> str:
+    """Say that an extra is not installed, and what to do."""
+    text = f"{option}: needs {extra.packages[0]}, which is not installed: {extra.install} ({why})"
+    if extra.has_wheel(*here()):
+        return text
+    return f"{text}\n{extra.packages[0]} has no wheel for {python_here()}: {_where(extra)} has"
+
+
+def _where(extra: Extra) -> str:
+    if extra.wheels is None:
+        return "every Python"
+    machines = ", ".join(_MACHINES[machine] for machine in extra.wheels.machines)
+    return f"CPython 3.11 to {'.'.join(map(str, extra.wheels.newest))} on {machines}"
+
+
+def table() -> str:
+    """Return README's table of extras."""
+    lines = ["| extra | for | installs | wheels |", "| --- | --- | --- | --- |"]
+    for extra in EXTRAS:
+        packages = ", ".join(extra.packages)
+        where = _where(extra) if extra.wheels else "every Python and system"
+        lines.append(f"| `dmpcli[{extra.name}]` | {extra.purpose} | {packages} | {where} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,190 @@
+"""The set-up: done, or one line that says what to do; what an interrupted one left is no obstacle.
+
+With an empty lock file and without the project, so that no package index is asked.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+TOOLS = Path(__file__).parents[2] / "tools"
+
+
+class Place:
+    """A folder to set up in, and how."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.venv = folder / ".venv"
+        self.stamp = self.venv / "installed"
+        self.lock = folder / "empty.lock"
+        self.lock.write_text("# nothing\n")
+        self.python = sys.executable
+        self.environment = dict(os.environ) | {"PIP_CONFIG_FILE": os.devnull}
+
+    def command(self, venv=".venv"):
+        words = [self.python, venv, self.lock.name, "out", "bare"]
+        return ["sh", str(TOOLS / "set_up.sh"), *words]
+
+    def run(self, venv=".venv", **more):
+        environment = self.environment | more
+        return subprocess.run(
+            self.command(venv), cwd=self.folder, env=environment, capture_output=True, text=True
+        )
+
+    def done(self, **more):
+        ran = self.run(**more)
+        assert ran.returncode == 0, ran.stderr
+        assert self.stamp.exists()
+        return ran.stderr
+
+    def refused(self, venv=".venv", **more):
+        """Return the one line that it ended with."""
+        ran = self.run(venv, **more)
+        assert ran.returncode == 1
+        *_, line = ran.stderr.splitlines()
+        assert line.startswith("set-up: ")
+        assert "Traceback" not in ran.stderr
+        assert [x for x in ran.stderr.splitlines() if x != line and "into" not in x] == []
+        assert not self.stamp.exists()
+        return line
+
+    def script(self, text):
+        """Let PYTHON be a program of our own."""
+        file = self.folder / "python"
+        file.write_text(f"#!/bin/sh\n{text}\n")
+        file.chmod(0o755)
+        self.python = str(file)
+
+
+@pytest.fixture
+def place(tmp_path):
+    return Place(tmp_path)
+
+
+def test_a_python_that_is_not_there_or_does_not_run_is_one_line(place):
+    place.python = "python3.99"
+    assert "python3.99 does not run: name CPython 3.11 or newer" in place.refused()
+    place.script("echo 'pyenv: python3.12: command not found' >&2; exit 127")  # pyenv's stand-in
+    assert "does not run" in place.refused()
+
+
+@pytest.mark.parametrize("told", ["CPython 3.9.2", "PyPy 3.11.13"])
+def test_a_python_too_old_or_of_another_make_is_one_line(place, told):
+    place.script(f"echo {told}; exit 3")
+    assert f"is {told}, and dmpcli needs CPython 3.11 or newer" in place.refused()
+
+
+@pytest.mark.parametrize("module", ["venv", "ensurepip"])
+def test_a_python_without_venv_is_one_line_with_debians_package(place, module):
+    site = place.folder / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(f"import sys\nsys.modules[{module!r}] = None\n")
+    said = place.refused(PYTHONPATH=str(site))
+    package = f"python{sys.version_info.major}.{sys.version_info.minor}-venv"
+    assert f"without its module {module}: on Debian and Ubuntu sudo apt install {package}" in said
+
+
+@pytest.mark.parametrize("venv", ["/dev/null/venv", "/proc/venv"])
+def test_a_place_that_cannot_be_written_is_one_line(place, venv):
+    assert "cannot be written" in place.refused(venv)
+    assert "VENV=DIR OUT=DIR" in place.refused(venv)
+
+
+def test_a_folder_that_holds_something_else_is_not_emptied(place):
+    place.venv.mkdir()
+    (place.venv / "thesis.tex").touch()
+    assert "holds files and is no environment" in place.refused()
+    assert (place.venv / "thesis.tex").exists()
+
+
+@pytest.mark.slow
+def test_no_index_is_one_line_and_the_next_one_recovers(place):
+    place.lock.write_text("six==1.16.0\n")
+    nobody = {"PIP_INDEX_URL": "http://127.0.0.1:9/simple", "PIP_FIND_LINKS": ""}
+    said = place.refused(**nobody)
+    assert "no package index is reached: check network and proxy" in said
+    assert "PIP_INDEX_URL=URL" in said
+    place.lock.write_text("# nothing\n")
+    place.done()
+
+
+@pytest.mark.slow
+def test_a_package_without_a_wheel_is_named_with_the_python(place):
+    place.lock.write_text("ur-rtde==1.6.5\n")
+    (place.folder / "links").mkdir()
+    said = place.refused(PIP_NO_INDEX="1", PIP_FIND_LINKS="links")
+    assert "no wheel of ur-rtde==1.6.5 for CPython" in said
+
+
+@pytest.mark.slow
+def test_it_is_made_once_and_anew_when_lock_python_or_place_changes(place):
+    assert "into .venv" in place.done()
+    assert place.done() == ""
+    place.lock.write_text("# another\n")
+    assert "into .venv" in place.done()
+    made = json.loads(place.stamp.read_text())
+    place.stamp.write_text(json.dumps(made | {"python": "3.11.0 elsewhere"}))
+    (place.venv / "left-over").touch()
+    assert "into .venv" in place.done()
+    assert not (place.venv / "left-over").exists()
+    moved = place.folder / "moved"
+    place.venv.rename(moved)
+    moved.rename(place.venv)
+    assert place.done() == ""
+
+
+@pytest.mark.slow
+def test_what_an_interrupted_one_left_is_no_obstacle(place):
+    running = subprocess.Popen(place.command(), cwd=place.folder, stderr=subprocess.DEVNULL)
+    while not (place.venv / "set-up.log").exists():
+        assert running.poll() is None
+        time.sleep(0.01)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    assert not place.stamp.exists()
+    assert "into .venv" in place.done()
+
+
+@pytest.mark.slow
+def test_two_at_once_make_one_environment(place):
+    running = [
+        subprocess.Popen(place.command(), cwd=place.folder, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    told = [process.communicate()[1] for process in running]
+    assert [process.returncode for process in running] == [0, 0]
+    assert sorted(said.count("into .venv") for said in told) == [0, 1]
+
+
+@pytest.mark.slow
+def test_spaces_umlauts_a_long_path_and_locale_c_do_no_harm(tmp_path):
+    folder = tmp_path / "Größe und Platz" / ("lang " * 40)
+    folder.mkdir(parents=True)
+    place = Place(folder)
+    place.done(LC_ALL="C", LANG="C")
+    pip = subprocess.run([folder / ".venv/bin/pip", "--version"], capture_output=True, check=True)
+    assert b"pip" in pip.stdout
+
+
+@pytest.mark.slow
+def test_what_a_shell_says_to_pip_and_python_does_not_reach_the_environment(place):
+    elsewhere = str(place.folder / "elsewhere")
+    polluted = {"PIP_USER": "1", "PIP_TARGET": elsewhere, "HOME": "/dev/null/home"}
+    place.done(**polluted)
+    assert not Path(elsewhere).exists()
+
+
+@pytest.mark.slow
+def test_the_environments_own_python_makes_nothing_anew_and_can_begin_again(place):
+    place.done()
+    place.python = str(place.venv / "bin/python")
+    assert place.done() == ""
+    place.lock.write_text("# another\n")
+    assert "into .venv" in place.done()

@@ -1,0 +1,263 @@
+"""Make the environment that the Makefile's targets work in: ``set_up.py VENV LOCK OUT [bare]``.
+
+It is made anew when Python, lock file or place is another than it was made with, or when it was
+never finished: what half an installation left cannot be told from what is whole. ``VENV/installed``
+says what it was made with and is written last. Whatever stands in the way is said in one line.
+A bare one holds the lock's packages without this project.
+"""
+
+import contextlib
+import fcntl
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LOG = "set-up.log"
+OURS = {"installed", LOG, "pyvenv.cfg"}
+"""Any of these says that a folder is an environment and may be emptied."""
+
+NAME = f"CPython {platform.python_version()}"
+# What a user's shell or pip.conf may say, and what must not reach pip in an environment: PIP_USER
+# ends in "Can not perform a '--user' install" (pip issue 8977), a target or prefix goes elsewhere.
+QUIET = (
+    "PIP_TARGET",
+    "PIP_PREFIX",
+    "PIP_ROOT",
+    "PIP_REQUIRE_VIRTUALENV",
+    "PYTHONPATH",
+    "PYTHONHOME",
+)
+
+UNREACHED = (
+    "NewConnectionError|NameResolutionError|ConnectTimeoutError|ReadTimeoutError|ProxyError"
+    "|Connection (refused|reset)|Network is unreachable|Failed to establish a new connection"
+    "|Temporary failure in name resolution|getaddrinfo failed|Max retries exceeded"
+)
+
+
+class SetUpError(Exception):
+    """What stands in the way, and what to do."""
+
+
+def main(venv: Path, lock: Path, out: Path, bare: bool) -> None:
+    """Make the environment, unless it is there and whole."""
+    if sys.prefix != sys.base_prefix and Path(sys.prefix).resolve() == venv.resolve():
+        # Called by the environment's own Python: one that is about to be made anew cannot do it.
+        os.execv(base(), [base(), *sys.argv])
+    for folder in (venv, out):
+        writable(folder)
+    wanted = {
+        "python": f"{sys.version} {sys.base_prefix}",
+        "place": str(venv.resolve()),
+        "lock": digest(lock),
+        "project": "" if bare else digest(ROOT / "pyproject.toml", *installed_files()),
+    }
+    with alone(venv):
+        there = made_with(venv)
+        if there == wanted:
+            return
+        (venv / "installed").unlink(missing_ok=True)
+        if there is None or {**there, "project": wanted["project"]} != wanted:
+            fresh(venv)
+            say(f"{NAME} into {venv}, from {lock.name}; about a minute")
+            # The lock names every package, so that nothing is left to resolve; what no wheel is
+            # there for would be compiled for minutes and fail in a compiler's words. Python writes
+            # its byte code of what is used when it is first used, in half the time.
+            pip(venv, "-r", str(lock), "--no-deps", "--only-binary", ":all:", "--no-compile")
+        if not bare:
+            project(venv)
+        (venv / "installed").write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
+
+
+def base() -> str:
+    """Return the Python that an environment's Python was made with."""
+    return str(getattr(sys, "_base_executable", sys.executable))
+
+
+def digest(*files: Path) -> str:
+    """Return the SHA-256 of files."""
+    total = hashlib.sha256()
+    for file in files:
+        total.update(file.read_bytes())
+    return total.hexdigest()
+
+
+def editable() -> bool:
+    """Tell whether the source folder can take the marks of an editable installation."""
+    return os.access(ROOT, os.W_OK)
+
+
+def installed_files() -> list[Path]:
+    """Return the files of the package that an installation copies: none where it is editable."""
+    if editable():
+        return []
+    return sorted(p for p in (ROOT / "dmpcli").rglob("*") if p.is_file() and p.suffix != ".pyc")
+
+
+def writable(folder: Path) -> None:
+    """Make a folder, and make sure that it can be written.
+
+    Raises
+    ------
+    SetUpError
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise SetUpError(
+            f"{folder} cannot be written ({error.strerror}): copy this folder to where you may "
+            "write, or name others: make ... VENV=DIR OUT=DIR"
+        ) from None
+
+
+@contextlib.contextmanager
+def alone(venv: Path) -> Iterator[None]:
+    """Let one make at a time work on an environment; the others wait, and then find it whole."""
+    folder = os.open(venv.parent, os.O_RDONLY)
+    try:
+        # Where a file system knows no locks, two at a time are the user's to avoid.
+        with contextlib.suppress(OSError):
+            fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
+def made_with(venv: Path) -> dict[str, str] | None:
+    """Return what a whole environment was made with; nothing where there is none."""
+    try:
+        found = json.loads((venv / "installed").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    works = (venv / "bin/python").exists() and isinstance(found, dict)
+    return found if works else None
+
+
+def fresh(venv: Path) -> None:
+    """Make an empty environment where one may have been.
+
+    Raises
+    ------
+    SetUpError
+    """
+    there = {path.name for path in venv.iterdir()}
+    if there and not there & OURS:
+        raise SetUpError(
+            f"{venv} holds files and is no environment: name another as make ... VENV=DIR"
+        )
+    missing = [name for name in ("venv", "ensurepip") if importlib.util.find_spec(name) is None]
+    if missing:
+        package = f"python{sys.version_info.major}.{sys.version_info.minor}-venv"
+        raise SetUpError(
+            f"{base()} ({NAME}) comes without its module {missing[0]}: on Debian and Ubuntu "
+            f"sudo apt install {package} (or python3-venv); or name another: make ... PYTHON=..."
+        )
+    # First of all, so that an interrupted run leaves what the next one knows as ours.
+    (venv / LOG).touch()
+    for path in venv.iterdir():
+        if path.name == LOG:
+            continue
+        shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+    done = run(venv, base(), "-m", "venv", str(venv))
+    if done:
+        raise SetUpError(f"{NAME} makes no environment: {last_line(done)}")
+
+
+def project(venv: Path) -> None:
+    """Install this project: as it lies here, or a copy where the folder can't be written."""
+    more = ("--no-deps", "--no-build-isolation")
+    if editable():
+        pip(venv, *more, "--editable", str(ROOT))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, "dmpcli")
+        copy.mkdir()
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
+            shutil.copy(ROOT / name, copy / name)
+        ignore = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / "dmpcli", copy / "dmpcli", ignore=ignore)
+        pip(venv, *more, "--force-reinstall", str(copy))
+
+
+def pip(venv: Path, *words: str) -> None:
+    """Run ``pip install``; its words go to the log.
+
+    Raises
+    ------
+    SetUpError
+    """
+    options = ("--quiet", "--disable-pip-version-check", "--no-input", "--retries", "3")
+    said = run(venv, str(venv / "bin/python"), "-m", "pip", "install", *options, *words)
+    if said:
+        raise SetUpError(f"{why(said)} (all of pip's words: {venv / LOG})")
+
+
+def run(venv: Path, *command: str) -> str:
+    """Run a command and log it; return what it said where it failed, else nothing."""
+    environment = {name: value for name, value in os.environ.items() if name not in QUIET}
+    environment |= {"PIP_USER": "0", "PYTHONUTF8": "1"}
+    done = subprocess.run(
+        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, encoding="utf-8", errors="replace", check=False,
+    )  # fmt: skip
+    with (venv / LOG).open("a", encoding="utf-8") as log:
+        log.write(f"$ {' '.join(command)}\n{done.stdout}")
+    return (done.stdout.strip() or f"it ended with {done.returncode}") if done.returncode else ""
+
+
+def why(said: str) -> str:
+    """Say in one line why pip failed, and what to do."""
+    if "No space left on device" in said:
+        return (
+            "the disk is full: an environment takes about 1 GB; name a place as make ... VENV=DIR"
+        )
+    if "CERTIFICATE_VERIFY_FAILED" in said:
+        return (
+            "the package index's certificate is not trusted: name your authority's as PIP_CERT=FILE"
+        )
+    if re.search(UNREACHED, said):
+        return (
+            "no package index is reached: check network and proxy, or name one as PIP_INDEX_URL=URL"
+        )
+    none = re.search(r"No matching distribution found for (\S+)", said)
+    if none:
+        where = f"{NAME} on {platform.system()} {platform.machine()}"
+        return f"the package index has no wheel of {none[1]} for {where}; try another PYTHON=..."
+    return f"pip failed: {last_line(said)}"
+
+
+def last_line(said: str) -> str:
+    """Return the last error, or else the last line, of what a command said."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    errors = [line for line in lines if line.lower().startswith("error")]
+    return (errors or lines)[-1]
+
+
+def say(text: str) -> None:
+    """Tell what is done or what is wrong, on standard error."""
+    print(f"set-up: {text}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        main(*map(Path, sys.argv[1:4]), bare=sys.argv[4:] == ["bare"])
+    except SetUpError as error:
+        say(str(error))
+        sys.exit(1)
+    except KeyboardInterrupt:
+        say("interrupted; the next make begins it anew")
+        sys.exit(130)
