@@ -253,20 +253,30 @@ def test_by_hand_a_refused_set_that_is_not_kept_is_told_to_be_lost(tmp_path):
     assert "; 1 pose not kept: --save POSES keeps them" in one.said
 
 
-@pytest.mark.slow
-def test_ctrl_c_decelerates_and_ends_with_its_exit_code(tmp_path):
+def interrupted(folder, patience):
+    """Interrupt a calibration after so many seconds; return its exit code and what it said."""
     command = [DMPCLI, "calibrate", "-o", "tool.json", "--realtime"]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
     try:
         with pytest.raises(subprocess.TimeoutExpired):
-            process.wait(timeout=3.0)
+            process.wait(timeout=patience)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=20.0)
+        _, said = process.communicate(timeout=60.0)
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
-    assert process.returncode == 130
+    return process.returncode, said
+
+
+@pytest.mark.slow
+def test_ctrl_c_decelerates_and_ends_with_its_exit_code(tmp_path):
+    # A busy machine may still be importing after 3 s: then there is no motion to stop, nor a word.
+    for patience in (3.0, 12.0, 40.0):
+        code, said = interrupted(tmp_path, patience)
+        assert code == 130
+        if said:
+            break
     assert "SIGINT" in said
     assert "Traceback" not in said
     assert not (tmp_path / "tool.json").exists()
