@@ -84,7 +84,8 @@ DIST := $(OUT)/dist
 dist:
 	@sh tools/set_up.sh "$(PYTHON)" "$(DIST)/tools" requirements-dist.lock "$(OUT)" bare
 	rm -rf $(DIST)/files
-	SOURCE_DATE_EPOCH=946684800 $(DIST)/tools/bin/python -m build --no-isolation --outdir $(DIST)/files . > $(DIST)/build.log
+	SOURCE_DATE_EPOCH=946684800 $(DIST)/tools/bin/python -m build --no-isolation \
+	    --outdir $(DIST)/files . > $(DIST)/build.log 2>&1 || { cat $(DIST)/build.log; exit 1; }
 	$(DIST)/tools/bin/python -m twine check --strict $(DIST)/files/*
 	$(DIST)/tools/bin/python -m check_wheel_contents $(DIST)/files/*.whl
 	$(DIST)/tools/bin/python tools/check_wheel.py $(DIST)/files/*.whl $(DIST)/bare requirements.lock
