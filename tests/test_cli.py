@@ -28,6 +28,7 @@ def test_the_front_door_loads_nothing_heavy(args):
     assert not HEAVY & loaded_by(code)
 
 
+@pytest.mark.slow
 def test_generalize_and_execute_load_no_scipy_and_no_pandas(tmp_path):
     skill, drawn, run = (str(tmp_path / name) for name in ("s.json", "t.parquet", "r.parquet"))
     reference = str(ROOT / "sample_runs" / "reference.parquet")

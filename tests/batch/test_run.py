@@ -138,6 +138,7 @@ def test_a_resumed_run_keeps_whole_parts_and_draws_the_others_again(learned, who
     assert content(folder) == files
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", [("--rate", 25), ("--float32",), ("--amplitude", "scale")])
 def test_parts_of_other_options_are_not_kept(learned, whole, tmp_path, other):
     table, files = whole
@@ -182,6 +183,7 @@ def children(pid):
     return [int(c) for c in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_told_and_what_it_had_drawn_stays(learned, tmp_path):
     table = write_pairs(tmp_path / "p.csv", 6000)
     folder = tmp_path / "b"
@@ -199,6 +201,7 @@ def test_a_process_that_is_killed_is_told_and_what_it_had_drawn_stays(learned, t
     assert "_manifest.json" not in content(folder)
 
 
+@pytest.mark.slow
 def test_single_precision_keeps_times_and_halves_the_step_of_places(learned, whole, tmp_path):
     table, files = whole
     run(learned, tmp_path / "b", table, "--on-error", "skip", "--float32", "--compression", "lz4")
@@ -209,6 +212,7 @@ def test_single_precision_keeps_times_and_halves_the_step_of_places(learned, who
         np.testing.assert_allclose(single.position(), double.position(), rtol=6e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -229,6 +233,7 @@ def test_wrong_options_are_refused_before_the_folder_is_touched(
     assert not (tmp_path / "b").exists()
 
 
+@pytest.mark.slow
 def test_options_of_batches_belong_to_pairs(learned, tmp_path):
     command = [DMPCLI, "generalize", learned, "-o", tmp_path / "t.parquet", "--reproduce"]
     done = subprocess.run([*map(str, command), "--jobs", "2"], capture_output=True, text=True)

@@ -127,6 +127,7 @@ def test_in_even_times_a_moving_tip_is_waited_for(tmp_path):
     np.testing.assert_allclose(z, [10, 20, 30], atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_tip_that_never_rests_is_refused_and_the_points_are_kept(tmp_path):
     with pytest.raises(RefusedError, match=r"point 2: the tool still moves .* 1 point kept"):
         in_time(tmp_path, lambda t: [10.0 * max(t - 4.0, 0.0), 0, 0])

@@ -58,6 +58,7 @@ class Bench:
         return self
 
 
+@pytest.mark.slow
 def test_every_pose_is_taken_at_rest_and_the_tool_comes_back_to_where_it_stood():
     done = Bench(poses=6).run()
     assert done.ticks == len(done.taken) == 6
@@ -69,6 +70,7 @@ def test_every_pose_is_taken_at_rest_and_the_tool_comes_back_to_where_it_stood()
         assert np.degrees(np.arccos(cosine)) == pytest.approx(45.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_tip_stays_and_no_turn_is_faster_than_allowed():
     bench = Bench(poses=4, max_rotation_speed=0.2)
     seen = []
@@ -85,6 +87,7 @@ def test_the_tip_stays_and_no_turn_is_faster_than_allowed():
     assert np.linalg.norm(velocities[:, 3:], axis=1).max() < 0.2 * 1.02
 
 
+@pytest.mark.slow
 def test_a_signal_stops_between_poses_and_what_was_taken_stays():
     bench = Bench(poses=6, interrupt_at=3)
     with pytest.raises(Interrupted, match="SIGINT") as stopped:
@@ -93,6 +96,7 @@ def test_a_signal_stops_between_poses_and_what_was_taken_stays():
     assert len(bench.taken) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("faults", "error", "words"),
     [
@@ -147,6 +151,7 @@ def standing(joints):
     return Reach(arm), replace(Scene(), position=position, rotation=rotation, plate=None)
 
 
+@pytest.mark.slow
 def test_an_arm_that_can_reach_all_poses_may_go():
     joints = np.radians([10.0, -80.0, 100.0, -110.0, -90.0, 20.0])
     reach, scene = standing(joints)

@@ -41,6 +41,7 @@ def assert_truth(tool):
     assert np.degrees(np.linalg.norm(tool.inclination)) < 0.3
 
 
+@pytest.mark.slow
 def test_the_mocks_truth_comes_back_within_the_bounds(lab, tmp_path):
     calibrate("-o", tmp_path / "tool.json", "--robot", "mock:?seed=1", "-q")
     for file in (tmp_path / "tool.json", lab[0] / "tool.json"):
@@ -66,6 +67,7 @@ def test_the_file_obeys_its_schema_and_names_no_time_host_or_path(lab):
     assert tool_file.decode(Source("t", text.encode())).sensor == "mock"
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(lab, tmp_path):
     calibrate("-o", tmp_path / "tool.json", "--save", tmp_path / "poses.parquet", "-q")
     for name in ("tool.json", "poses.parquet"):
@@ -110,6 +112,7 @@ def expected_drift(tool):
     return np.diag([1.0, -1.0, -1.0]) @ (PEN.zero - tool_file.decode(read(tool)).zero)[:3]
 
 
+@pytest.mark.slow
 def test_record_and_execute_take_the_tool(lab, tmp_path):
     tool = lab[0] / "tool.json"
     run("record", "-o", tmp_path / "d.parquet", "--tool", tool, "--duration", 3, "-q")
@@ -142,6 +145,7 @@ def stroke(tmp_path):
     return tmp_path / "t.parquet"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["record", "execute"])
 @pytest.mark.parametrize("weight", [2.0, 9.0])
 def test_the_calibration_of_another_tool_is_refused_before_anything_moves(
@@ -185,6 +189,7 @@ def test_the_calibration_of_another_sensor_is_refused(lab, tmp_path):
     assert "calibrated with the sensor ATI Mini45 FT1, and mock is connected" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "code", "words"),
     [
@@ -229,6 +234,7 @@ def test_poses_taken_before_a_failure_are_kept(tmp_path):
     assert 2 <= len(taken) < 6
 
 
+@pytest.mark.slow
 def test_by_hand_enter_takes_a_pose_and_one_orientation_is_not_enough(tmp_path):
     options = ["--by-hand", "--dwell", 0.2, "--save", "p.parquet"]
     with Terminal("calibrate", "-o", "tool.json", *options, cwd=tmp_path) as person:
@@ -243,6 +249,7 @@ def test_by_hand_enter_takes_a_pose_and_one_orientation_is_not_enough(tmp_path):
     assert not (tmp_path / "tool.json").exists()
 
 
+@pytest.mark.slow
 def test_by_hand_a_refused_set_that_is_not_kept_is_told_to_be_lost(tmp_path):
     with Terminal("calibrate", "-o", "tool.json", "--by-hand", "--dwell", 0.2, cwd=tmp_path) as one:
         one.wait_for("Enter takes the pose, q and Enter ends")

@@ -97,6 +97,7 @@ def test_a_run_holds_what_was_planned_sent_and_done(traj, tmp_path):
     assert run.provenance.inputs == ({"role": "trajectory", "sha256": streams.read(traj).sha256},)
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bytes(traj, tmp_path):
     for name in ("a", "b"):
         extra = ("--coupling", "force", "--force-setpoint", 5)
@@ -104,6 +105,7 @@ def test_the_same_run_gives_the_same_bytes(traj, tmp_path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+@pytest.mark.slow
 def test_standard_input_and_output(traj, tmp_path):
     command = [sys.executable, "-m", "dmpcli", "execute", "-", "-o", "-"]
     done = subprocess.run(command, input=traj.read_bytes(), capture_output=True, check=True)
@@ -421,6 +423,7 @@ def test_a_sensor_is_logged_compensated(traj, tmp_path):
     assert run_of(out).columns["fz"].mean() == pytest.approx(5.0, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [-18.56, -17.56, -16.56])
 def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tmp_path, height):
     out = tmp_path / "run.parquet"

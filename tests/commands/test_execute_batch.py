@@ -178,6 +178,7 @@ def test_every_limit_is_kept_over_all_ways_by_finite_differences(drawn):
             assert np.linalg.norm(rate, axis=1).max() <= limit * 1.0001
 
 
+@pytest.mark.slow
 def test_each_way_keeps_its_own_speed(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out, "--transfer-speed", 60, "--retract-speed", 15, "--clearance", 12)

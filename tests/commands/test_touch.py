@@ -83,6 +83,7 @@ def test_a_wrong_command_line_is_one_message(tmp_path, monkeypatch, options, wor
     assert not (tmp_path / "t.csv").exists()
 
 
+@pytest.mark.slow
 def test_enter_takes_points_and_each_is_there_at_once(tmp_path):
     file = tmp_path / "points.csv"
     with Terminal("touch", "-o", file, cwd=tmp_path) as person:

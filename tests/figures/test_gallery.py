@@ -82,6 +82,7 @@ def test_pictures_open_and_hold_the_styles_of_their_roles(strokes):
     assert "<dc:date>" not in drag + new
 
 
+@pytest.mark.slow
 def test_a_readers_matplotlibrc_has_no_say_and_keeps_its_settings(strokes):
     expected = gallery.gallery(strokes[:1])
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "svg.hashsalt": "x"}):
@@ -97,6 +98,7 @@ def test_a_demonstration_alone_is_drawn_too():
     }
 
 
+@pytest.mark.slow
 def test_further_places_have_their_own_figures_and_many_places_share_one():
     def at(i):
         aside = np.array([0.0, 50.0 * i, 0.0])

@@ -141,6 +141,7 @@ def test_planes_that_nobody_names_are_fitted(tmp_path):
     alike(put_batch(tmp_path / "b", [plain]), taught())
 
 
+@pytest.mark.slow
 def test_on_a_plane_that_is_given(tmp_path):
     normal = np.array([0.0, 0.1, 1.0]) / np.linalg.norm([0.0, 0.1, 1.0])
     plane = Plane(START - [0.0, 0.0, 2.0], normal)

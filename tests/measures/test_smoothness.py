@@ -40,6 +40,7 @@ def test_amplitude_and_duration_do_not_matter(T, amplitude):
     )
 
 
+@pytest.mark.slow
 def test_sparc_of_a_minimum_jerk_reach_is_that_of_its_fourier_transform():
     def magnitude(f):
         def speed(s):

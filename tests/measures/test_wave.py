@@ -107,6 +107,7 @@ def test_extrema_are_those_of_scipys_prominence(values):
     assert np.abs(found - expected).max(initial=0.0) <= 0.5 + 1e-9
 
 
+@pytest.mark.slow
 @given(signals, st.floats(0.01, 100), st.floats(-1000, 1000))
 def test_heights_scale_with_the_signal_and_ignore_its_offset(values, factor, offset):
     v = np.array(values)

@@ -86,6 +86,7 @@ def test_the_sample_runs_are_what_the_tool_makes(dmpcli, tmp_path):
     assert kept.provenance.facts["simulated"] is True
 
 
+@pytest.mark.slow
 def test_the_recorded_samples_wave_height_is_the_papers(dmpcli):
     found = heights(dmpcli, RECORDED)
     assert found["recorded"] == pytest.approx(49.979, abs=0.3)

@@ -383,6 +383,7 @@ def test_triangles_thrown_on_a_lattice_become_sound_or_are_refused(faces):
     assert parts.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_no_file_whatever_it_holds_ends_the_process():
     """Damaged files of every format, in a process of their own: a crash would be a signal."""
     script = """

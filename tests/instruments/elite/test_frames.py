@@ -120,6 +120,7 @@ def damaged(rng, stamp):
     return frame(stamp=stamp, state=rng.randrange(6, 2**31), servo=rng.randrange(2, 9))
 
 
+@pytest.mark.slow
 def test_of_ten_thousand_damaged_frames_none_is_believed_and_the_stream_is_found_again():
     rng = random.Random(4)
     buffer, faults = FrameBuffer(), set()

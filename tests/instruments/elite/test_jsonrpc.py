@@ -153,6 +153,7 @@ def test_nothing_that_still_waits_to_be_sent_arrives_after_the_connection_is_dro
                 controller.recv(1)
 
 
+@pytest.mark.slow
 def test_two_hundred_damaged_replies_over_the_wire_neither_hang_nor_deceive(robot, client_of):
     rng = random.Random(8)
     robot.answers["get_joint_pos"] = lambda _: next(said)
