@@ -365,7 +365,9 @@ def at(address):
     return ur.make(Address("robot", "ur", address), MonotonicClock())
 
 
-def test_an_address_where_nobody_listens_is_one_line():
+def test_an_address_where_nobody_listens_is_one_line(monkeypatch):
+    trap = types.SimpleNamespace(RTDEReceiveInterface=lambda *_, **__: pytest.fail("let in"))
+    monkeypatch.setitem(sys.modules, "rtde_receive", trap)
     with pytest.raises(InstrumentError, match="cannot be reached") as caught:
         at(own_loopback()).connect()
     assert "\n" not in str(caught.value)
