@@ -1,25 +1,33 @@
 """Demonstrations from any recording: ours, or a table with ``t x y z`` under any names and units.
 
-Lengths, angles and times of other makes are converted here, at the edge.
+Lengths, angles and times of other makes are converted here, at the edge, and what was assumed of
+them is told.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from dmpcli import rotations
-from dmpcli.arrays import Floats
-from dmpcli.errors import InputError
+from dmpcli.arrays import Floats, Integers
+from dmpcli.errors import InputError, counted
 from dmpcli.primitives.smoothing import Stroke
-from dmpcli.records import record, schemas, tables
+from dmpcli.records import (
+    layouts,
+    motive,
+    plausibility,
+    record,
+    rotation_forms,
+    schemas,
+    stamps,
+    tables,
+)
+from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Column, Layout
 from dmpcli.records.pairs import FARTHEST
-from dmpcli.records.schemas import EULER_ANGLES, POSE
+from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
+from dmpcli.records.schemas import EULER_ANGLES
 from dmpcli.records.streams import Source
-from dmpcli.records.tables import Table
-
-RotationForm = Literal["euler", "rotvec", "quaternion"]
+from dmpcli.records.tables import HeadlessError, Table
 
 SHORTEST = 10
 """Fewer samples than this are no stroke."""
@@ -36,93 +44,79 @@ LARGEST_TURN = 4 * np.pi
 LONGEST_GAP = 25.0
 """A gap of more median steps than this cannot be filled in: nobody knows what the tool did."""
 
-LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-ANGLE = {"rad": 1.0, "deg": np.pi / 180.0}
-
-_QUATERNION = ("qx", "qy", "qz", "qw")
-_MAPPABLE = ("t", *POSE, *_QUATERNION)
+_FEW_DIGITS = 0.2
+"""Where more than this part of the stamps repeats, they were written with too few digits."""
 
 
 @dataclass(frozen=True)
-class Layout:
-    """How another program's table maps to ours.
+class Recording:
+    """A demonstration as read.
 
     Attributes
     ----------
-    columns : dict of str
-        Its column name by ours (t, x, y, z, rx, ry, rz, or qx, qy, qz, qw).
-    length, time, angle : str
-        Its units.
-    rotation : {'euler', 'rotvec', 'quaternion'}
-        What its rotation columns hold; Euler angles are X-Y-Z intrinsic.
+    stroke : Stroke
+    told : tuple of str
+        How it was read, and what was assumed for that.
+    doubts : tuple of str
+        What is likely wrong with it, with the remedy.
+    ours : bool
+        Whether it is a file of this program's, which tells its units and angles.
     """
 
-    columns: dict[str, str] = field(default_factory=dict)
-    length: str = "mm"
-    time: str = "s"
-    angle: str = "rad"
-    rotation: RotationForm = "euler"
-
-    def column(self, ours: str) -> str:
-        """Return the table's name for one of our columns."""
-        return self.columns.get(ours, ours)
-
-    def as_options(self) -> dict[str, Any]:
-        """Return the layout as JSON values, for the provenance of what was read with it."""
-        return asdict(self)
+    stroke: Stroke
+    told: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    ours: bool = False
 
 
-LAYOUTS = {
-    # Universal Robots RTDE recordings (the csv_writer of its RTDE Python client library).
-    "ur": Layout(
-        {"t": "timestamp"} | {ours: f"actual_TCP_pose_{i}" for i, ours in enumerate(POSE)},
-        length="m",
-        rotation="rotvec",
-    ),
-    # TUM trajectory text with a header line: t x y z qx qy qz qw.
-    "tum": Layout(length="m", rotation="quaternion"),
-}
+@dataclass
+class _Reading:
+    """A table on its way to a stroke: what was read of it, its units, the remarks so far."""
+
+    table: Table
+    layout: Layout
+    taken: list[str] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+    sure: set[str] = field(default_factory=set)
+
+    @property
+    def names(self) -> list[str]:
+        return list(self.table.columns)
+
+    def find(self, ours: str) -> Column | None:
+        """Find one of our columns and count it as read."""
+        try:
+            column = layouts.found(self.layout, self.names, ours)
+        except InputError as error:
+            raise InputError(f"{self.table.name}: {error}") from None
+        if column is not None:
+            self.taken.append(column.name)
+        return column
+
+    def unit(self, column: Column, kind: str, known: dict[str, float]) -> str:
+        """Return a column's unit: as an option says, else its name, else the layout."""
+        named = column.unit
+        if named not in known and not column.name.endswith(("]", ")")):
+            # An ending such as _m or _s that is part of the name.
+            named = None
+        unit: str = getattr(self.layout, kind)
+        if named is not None and kind not in self.layout.said:
+            if named not in known:
+                raise InputError(
+                    f"{self.table.name}: column {column.name!r}: unit {named!r} is not one of "
+                    f"{', '.join(known)}; say which with --{kind}-unit"
+                )
+            unit = named
+            if self.units.get(kind) != unit:
+                self.told.append(f"{kind} read in {unit}, as column {column.name!r} says")
+            self.sure.add(kind)
+        self.units[kind] = unit
+        return unit
 
 
-def adapted(base: Layout, mapping: Sequence[str], given: Mapping[str, str]) -> Layout:
-    """Return a layout with columns and units replaced.
-
-    Parameters
-    ----------
-    base : Layout
-    mapping : sequence of str
-        ``OURS=THEIRS`` each.
-    given : mapping
-        ``length``, ``time``, ``angle`` (units) and ``rotation`` (form).
-
-    Raises
-    ------
-    InputError
-        An entry is not of that form, or names a column, unit or form that there is not.
-    """
-    columns = dict(base.columns)
-    for entry in mapping:
-        ours, equals, theirs = entry.partition("=")
-        if not equals or not theirs or ours not in _MAPPABLE:
-            raise InputError(
-                f"--map {entry}: must be OURS=THEIRS, with OURS one of {', '.join(_MAPPABLE)}"
-            )
-        columns[ours] = theirs
-    choices: dict[str, Iterable[str]] = {
-        "length": LENGTH,
-        "time": TIME,
-        "angle": ANGLE,
-        "rotation": get_args(RotationForm),
-    }
-    for key, value in given.items():
-        if value not in choices[key]:
-            option = "--rotation" if key == "rotation" else f"--{key}-unit"
-            raise InputError(f"{option} {value}: must be one of {', '.join(choices[key])}")
-    return replace(base, columns=columns, **dict(given))  # type: ignore[arg-type]
-
-
-def stroke(source: Source, layout: Layout | None = None) -> Stroke:
+def read(source: Source, layout: Layout | None = None) -> Recording:
     """Read a demonstration for learning.
 
     Parameters
@@ -130,29 +124,249 @@ def stroke(source: Source, layout: Layout | None = None) -> Stroke:
     source : Source
         One of our demonstration files, or any CSV or Parquet table.
     layout : Layout, optional
-        For a table of another program's.
+        Of another program's table; one of ours tells its own.
 
     Raises
     ------
     InputError
-        A column is missing, holds text, NaN or infinity, time repeats or runs backward, or there
-        are fewer than `SHORTEST` samples or a long gap; names column and row.
+        A column is missing, holds text, NaN or infinity, time repeats or runs backward, there are
+        fewer than `SHORTEST` samples or a long gap, or the stroke is far too small for its unit of
+        length; names column and row, and the option that helps.
     """
-    if layout is None and record.is_ours(source):
+    if record.is_ours(source):
         ours = record.decode(source, schemas.DEMONSTRATION)
         _partly_null(ours)
-        t, position, rotation = ours.t, ours.position(), ours.rotation()
-        table = Table(source.name, ours.columns)
-    else:
-        if source.content.lstrip()[:1] == b"{":
+        stroke = Stroke(ours.t, ours.position(), ours.rotation())
+        _check_time(Table(source.name, ours.columns), stroke.t, "t")
+        _check_position(Table(source.name, ours.columns), stroke.position)
+        return Recording(stroke, ours=True)
+    if source.content.lstrip()[:1] == b"{":
+        raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
+    given = layout or Layout()
+    reading = _Reading(*_table(source, given))
+    reading.told += reading.table.remarks
+    t, name = _time(reading)
+    position = _position(reading)
+    rotation = _rotation(reading)
+    stroke = Stroke(t, position, rotation)
+    if "sample_rate" not in given.said:
+        stroke = _without_repeats(reading, stroke, name)
+    _check_time(reading.table, stroke.t, name)
+    _check_position(reading.table, stroke.position)
+    _doubt_units(reading, stroke)
+    reading.doubts += rotation_forms.unread(reading.names, reading.taken)
+    return Recording(stroke, tuple(reading.told), tuple(reading.doubts))
+
+
+def stroke(source: Source, layout: Layout | None = None) -> Stroke:
+    """Read a demonstration, see `read`, without what there is to say of it."""
+    return read(source, layout).stroke
+
+
+def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
+    """Read a table by its header, by the names given, or by those of its format."""
+    if motive.is_motive(source):
+        if not layout.columns:
+            raise InputError(f"{source.name}: is an export of Motive; --layout motive reads it")
+        return motive.read(source), layout
+    names = layout.header if "header" in layout.said else ()
+    try:
+        return tables.read(source, names, layout.decimal), layout
+    except HeadlessError as error:
+        commented = tables.commented_names(source, error.count)
+        if commented and _all_found(layout, commented):
+            return tables.read(source, commented, layout.decimal), layout
+        if layout.header:
+            return tables.read(source, layout.header, layout.decimal), layout
+        raise InputError(f"{source.name}: {_headless(error, commented)}") from None
+
+
+def _all_found(layout: Layout, names: list[str]) -> bool:
+    return all(layouts.found(layout, names, ours) is not None for ours in ("t", *"xyz"))
+
+
+def _headless(error: HeadlessError, commented: list[str] | None) -> str:
+    """Say which option reads a table without header."""
+    if commented:
+        suits = layouts.suited(commented)
+        how = f"--layout {suits[0]}" if suits else f"--columns {','.join(commented)}"
+        return f"the names of the columns are commented out; {how} reads them"
+    likely = {
+        3: "--columns x,y,z --sample-rate HZ",
+        4: "--columns t,x,y,z",
+        7: "--columns t,x,y,z,rx,ry,rz",
+        8: "--layout tum (t x y z qx qy qz qw)",
+    }
+    how = likely.get(error.count, "--columns t,x,y,z,...")
+    return (
+        f"line {error.line} holds {counted(error.count, 'number')}, not names of columns; name the "
+        f"columns in order, as {how} does"
+    )
+
+
+def _time(reading: _Reading) -> tuple[Floats, str]:
+    """Time of each row, s, and the column's name."""
+    table, layout = reading.table, reading.layout
+    column = reading.find("t")
+    if layout.sample_rate is not None:
+        if column is not None:
+            reading.told.append(f"column {column.name!r} is not read, since --sample-rate counts")
+        return np.arange(len(table)) / layout.sample_rate, "t"
+    if column is None:
+        raise InputError(f"{table.name}: {_no_column(reading, 't')}")
+    within = reading.find(NANOSECONDS)
+    if within is None and layout.columns == LAYOUTS["ros"].columns:
+        return _ros_time(reading, column), column.name
+    unit = reading.unit(column, "time", TIME)
+    return stamps.seconds(table, column.name, unit, within.name if within else None), column.name
+
+
+def _ros_time(reading: _Reading, column: Column) -> Floats:
+    """Read stamps of ROS in one column: nanoseconds where they are whole and that large."""
+    values = reading.table.numbers(column.name)
+    whole = len(values) > 0 and values[0] > 1e14
+    unit = "ns" if whole and "time" not in reading.layout.said else reading.layout.time
+    reading.units["time"] = unit
+    return stamps.seconds(reading.table, column.name, unit)
+
+
+def _position(reading: _Reading) -> Floats:
+    """Position of each row, mm, shape (T, 3)."""
+    axes = []
+    for ours in "xyz":
+        column = reading.find(ours)
+        if column is None:
+            raise InputError(f"{reading.table.name}: {_no_column(reading, ours)}")
+        factor = LENGTH[reading.unit(column, "length", LENGTH)]
+        axes.append(reading.table.numbers(column.name) * factor)
+    return np.stack(axes, axis=1)
+
+
+def _no_column(reading: _Reading, ours: str) -> str:
+    """Say that a column is missing, and what could read the table as it is."""
+    names = reading.names
+    shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
+    wanted = reading.layout.names(ours)[0]
+    text = f"column {wanted!r} is missing; it has {shown}"
+    suits = layouts.suited(names)
+    if suits and not reading.layout.columns:
+        return f"{text}; --layout {suits[0]} reads it"
+    if ours == "t":
+        return f"{text}; name the column of time with --map t=COLUMN, or say --sample-rate HZ"
+    return f"{text}; say which it is with --map {ours}=COLUMN"
+
+
+def _rotation(reading: _Reading) -> Floats | None:
+    """Rotation of each row, shape (T, 3, 3); None where no columns hold any."""
+    form, assumed = reading.layout.rotation, False
+    if form is None:
+        euler = any(layouts.found(reading.layout, reading.names, n) for n in EULER_NAMES)
+        form, assumed = ("euler" if euler else "quaternion"), True
+    wanted = rotation_forms.columns_of(form)
+    columns = _rotation_columns(reading, form, wanted, assumed)
+    if columns is None:
+        return None
+    values = np.stack([reading.table.numbers(column.name) for column in columns], axis=1)
+    by = ", ".join(column.name for column in columns[:4]) + ("" if len(columns) < 5 else ", ...")
+    bad = rotation_forms.wrong(form, values)
+    if bad is not None:
+        if assumed:
+            return None
+        raise InputError(
+            f"{reading.table.name}: {reading.table.at(bad[0])}: {bad[1]}; check which columns are "
+            "mapped"
+        )
+    if wanted == EULER_NAMES:
+        values = values * ANGLE[reading.unit(columns[0], "angle", ANGLE)]
+        if np.abs(values).max() > LARGEST_TURN:
+            row = int(np.argmax(np.abs(values).max(axis=1) > LARGEST_TURN))
             raise InputError(
-                f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet"
+                f"{reading.table.name}: {reading.table.at(row)}: an angle of "
+                f"{np.abs(values[row]).max():g} rad; check the unit of angle (--angle-unit deg)"
             )
-        table = tables.read(source)
-        t, position, rotation = _mapped(table, layout or Layout())
-    _check_time(table, t, layout or Layout())
-    _check_position(table, position)
-    return Stroke(t, position, rotation)
+    reading.taken += [column.name for column in columns]
+    R = rotation_forms.matrices(form, values)
+    reading.told.append(
+        f"{by} read as {rotation_forms.described(form)}"
+        f"{' (assumed; --rotation says otherwise)' if assumed else ''}; the tool leans "
+        f"{rotation_forms.lean(R[0]):.1f}° from straight down at the start"
+    )
+    if assumed and form == "euler":
+        calmer = rotation_forms.calmer(values)
+        if calmer is not None:
+            reading.doubts.append(
+                f"the tool leaps between samples where {by} are read as Euler angles; it does not "
+                f"with --rotation {calmer}"
+            )
+    return R
+
+
+def _rotation_columns(
+    reading: _Reading, form: str, wanted: tuple[str, ...], assumed: bool
+) -> list[Column] | None:
+    """Find the columns of a form of rotation; None where there are none."""
+    names = reading.names
+    found = [layouts.found(reading.layout, names, ours) for ours in wanted]
+    if not any(found) and wanted == QUATERNION_NAMES and not assumed:
+        try:
+            by = rotation_forms.numbered(form, names)
+        except InputError as error:
+            raise InputError(f"{reading.table.name}: {error}") from None
+        found = [Column(by[ours]) if ours in by else None for ours in wanted]
+    present = [column for column in found if column is not None]
+    if len(present) == len(wanted):
+        return present
+    if present and not (assumed and wanted == QUATERNION_NAMES):
+        missing = wanted[found.index(None)]
+        raise InputError(
+            f"{reading.table.name}: column {reading.layout.names(missing)[0]!r} is missing, but "
+            "other rotation columns are there; map all of them, or none"
+        )
+    if "rotation" in reading.layout.said:
+        raise InputError(
+            f"{reading.table.name}: --rotation {form}: columns {', '.join(wanted)} are missing; "
+            f"map them, as in --map {wanted[0]}=COLUMN"
+        )
+    return None
+
+
+def _without_repeats(reading: _Reading, stroke: Stroke, name: str) -> Stroke:
+    """Act on rows with one and the same stamp as the layout says."""
+    how = reading.layout.repeated
+    same = np.diff(stroke.t) == 0
+    if how == "error" or not same.any():
+        return stroke
+    starts: Integers = np.flatnonzero(np.r_[True, ~same])
+    sizes = np.diff(np.r_[starts, len(stroke.t)])
+    reading.told.append(
+        f"{counted(int(same.sum()), 'row')} repeated the stamp before (column {name!r}): "
+        f"{'the first of each is kept' if how == 'first' else 'their means are taken'}"
+    )
+    position, R = stroke.position[starts], stroke.rotation
+    if how == "mean":
+        position = np.add.reduceat(stroke.position, starts, axis=0) / sizes[:, None]
+    if R is not None and how == "mean":
+        q = rotations.to_quaternion(R)
+        # Both signs of a quaternion are one rotation: that of the first of each stamp.
+        q *= np.where(np.sum(q * np.repeat(q[starts], sizes, axis=0), axis=1) < 0, -1, 1)[:, None]
+        R = rotations.from_quaternion(np.add.reduceat(q, starts, axis=0))
+    elif R is not None:
+        R = R[starts]
+    return Stroke(stroke.t[starts], position, R)
+
+
+def _doubt_units(reading: _Reading, stroke: Stroke) -> None:
+    """Doubt a stroke that no hand or arm draws; refuse one far too small for an unsaid unit."""
+    found = plausibility.measures(stroke.t, stroke.position)
+    length = reading.units.get("length", reading.layout.length)
+    time = reading.units.get("time", reading.layout.time)
+    doubts = plausibility.doubts(found, length, time)
+    sure = "length" in reading.sure or "length" in reading.layout.said
+    if 0.0 < found.extent < plausibility.REFUSED and not sure:
+        raise InputError(
+            f"{reading.table.name}: {doubts[0]}; if it is right, --length-unit {length} says so"
+        )
+    reading.doubts += doubts
 
 
 def _partly_null(ours: record.Record) -> None:
@@ -165,73 +379,49 @@ def _partly_null(ours: record.Record) -> None:
             )
 
 
-def _mapped(table: Table, layout: Layout) -> tuple[Floats, Floats, Floats | None]:
-    t = table.numbers(layout.column("t")) * TIME[layout.time]
-    position = np.stack([table.numbers(layout.column(c)) for c in "xyz"], axis=1)
-    position *= LENGTH[layout.length]
-    names = _QUATERNION if layout.rotation == "quaternion" else EULER_ANGLES
-    present = [layout.column(c) in table.columns for c in names]
-    if not any(present):
-        return t, position, None
-    if not all(present):
-        missing = layout.column(names[present.index(False)])
-        raise InputError(
-            f"{table.name}: column {missing!r} is missing, but other rotation columns are there; "
-            "map all of them, or none"
-        )
-    values = np.stack([table.numbers(layout.column(c)) for c in names], axis=1)
-    if layout.rotation == "quaternion":
-        norm = np.linalg.norm(values, axis=1)
-        if np.any(np.abs(norm - 1.0) > 1e-2):
-            row = int(np.argmax(np.abs(norm - 1.0)))
-            raise InputError(
-                f"{table.name}: {table.at(row)}: the quaternion has norm {norm[row]:.3g}, not 1; "
-                "check which columns are mapped"
-            )
-        return t, position, rotations.from_quaternion(values)
-    values *= ANGLE[layout.angle]
-    if np.abs(values).max() > LARGEST_TURN:
-        row = int(np.argmax(np.abs(values).max(axis=1)))
-        raise InputError(
-            f"{table.name}: {table.at(row)}: an angle of {np.abs(values).max():g} rad; "
-            "check the unit of angle (--angle-unit deg)"
-        )
-    return (
-        t,
-        position,
-        (rotations.exp(values) if layout.rotation == "rotvec" else rotations.from_euler(values)),
-    )
-
-
-def _check_time(table: Table, t: Floats, layout: Layout) -> None:
+def _check_time(table: Table, t: Floats, name: str) -> None:
     if len(t) < SHORTEST:
         raise InputError(f"{table.name}: {len(t)} samples; a stroke needs at least {SHORTEST}")
     steps = np.diff(t)
     if np.any(steps <= 0):
         row = int(np.argmax(steps <= 0)) + 1
-        verb = "repeats" if steps[row - 1] == 0 else "runs backward"
+        repeats = steps[row - 1] == 0
         raise InputError(
-            f"{table.name}: column {layout.column('t')!r}, {table.at(row)}: time {verb} "
-            f"({t[row - 1]:.6g} s, then {t[row]:.6g} s); sort the rows or remove the repeated ones"
+            f"{table.name}: column {name!r}, {table.at(row)}: time "
+            f"{'repeats' if repeats else 'runs backward'} "
+            f"({t[row - 1]:.6g} s, then {t[row]:.6g} s); {_repeated(steps) if repeats else _SORT}"
         )
     step = float(np.median(steps))
     if t[-1] - t[0] > LONGEST:
         raise InputError(
-            f"{table.name}: column {layout.column('t')!r}: spans {t[-1] - t[0]:.3g} s; "
-            "check the unit of time (--time-unit)"
+            f"{table.name}: column {name!r}: spans {t[-1] - t[0]:.3g} s; "
+            "check the unit of time (--time-unit ms, us or ns)"
         )
     if step < SHORTEST_STEP:
         raise InputError(
-            f"{table.name}: column {layout.column('t')!r}: rows are {step:.3g} s apart; "
+            f"{table.name}: column {name!r}: rows are {step:.3g} s apart; "
             "check the unit of time (--time-unit)"
         )
     if np.any(steps > LONGEST_GAP * step):
         row = int(np.argmax(steps)) + 1
         raise InputError(
-            f"{table.name}: column {layout.column('t')!r}, {table.at(row)}: nothing was recorded "
+            f"{table.name}: column {name!r}, {table.at(row)}: nothing was recorded "
             f"for {steps[row - 1]:.6g} s, {steps[row - 1] / step:.0f} samples; cut the file there, "
             "or record again"
         )
+
+
+_SORT = "sort the rows"
+
+
+def _repeated(steps: Floats) -> str:
+    """Say what to do about stamps that repeat."""
+    if np.mean(steps == 0) > _FEW_DIGITS:
+        return (
+            f"{int(np.sum(steps == 0))} stamps do: they have too few digits; --sample-rate HZ "
+            "counts the rows instead"
+        )
+    return "--repeated-stamps first or mean makes one row of those with the same stamp"
 
 
 def _check_position(table: Table, position: Floats) -> None:

@@ -5,8 +5,9 @@ their bytes, and a bad cell can still be shown as it stands in the file.
 """
 
 import io
+import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,11 +22,29 @@ from dmpcli.records.streams import Source
 PARQUET_MAGIC = b"PAR1"
 
 _BLOCK = 1 << 24
+_LONGEST_LINE = 1 << 20
 _NUMBER = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"
 _PASSED_OVER = re.compile(rb"^[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
 _NEVER_WITHOUT = (b"#", b"\n\n", b"\n ", b"\n\t")
 """A text that does not begin with a blank, and holds none of these, has no such line."""
 _SEPARATORS = (b",", b";", b"\t")
+_DECIMAL_COMMA, _DECIMAL_POINT = re.compile(rb"[0-9],[0-9]"), re.compile(rb"[0-9]\.[0-9]")
+
+
+class HeadlessError(InputError):
+    """A table begins with numbers where the names of its columns should be.
+
+    Attributes
+    ----------
+    count : int
+        How many columns it has.
+    """
+
+    def __init__(self, name: str, line: int, count: int) -> None:
+        super().__init__(
+            f"{name}: line {line} holds numbers, not names of columns; put a header line above"
+        )
+        self.line, self.count = line, count
 
 
 @dataclass(frozen=True)
@@ -40,11 +59,17 @@ class Table:
         Arrays of numpy or Arrow, by the file's own names.
     lines : array of int, shape (rows,), optional
         The line of each row in a text file; without it rows are counted from 1.
+    decimal : {'.', ','}
+        The decimal sign of its text.
+    remarks : tuple of str
+        What a person should know of how it was read.
     """
 
     name: str
     columns: Mapping[str, Any]
     lines: Integers | None = None
+    decimal: str = "."
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -86,7 +111,7 @@ class Table:
         values = self.columns[column]
         if isinstance(values, np.ndarray):
             return values.astype(float)
-        return _floats(values)
+        return _floats(values, self.decimal)
 
     def texts(self, column: str) -> list[str]:
         """Return a column as text, numbers as a file shows them."""
@@ -100,7 +125,7 @@ class Table:
         values = self.columns[column]
         if isinstance(values, np.ndarray):
             return np.asarray(np.isnan(values.astype(float)))
-        if _is_text(values.type):
+        if is_text(values.type):
             import pyarrow.compute as pc
 
             blank = pc.equal(pc.utf8_trim_whitespace(values), "")
@@ -114,16 +139,19 @@ class Table:
         return "an empty cell" if value is None or str(value).strip() == "" else repr(str(value))
 
 
-def _is_text(kind: Any) -> bool:
+def is_text(kind: Any) -> bool:
+    """Tell an Arrow type of text."""
     return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
 
 
-def _floats(values: Any) -> Floats:
+def _floats(values: Any, decimal: str = ".") -> Floats:
     """Numbers of an Arrow array; NaN where there is none."""
     import pyarrow.compute as pc
 
-    if _is_text(values.type):
+    if is_text(values.type):
         text = pc.utf8_trim_whitespace(values)
+        if decimal == ",":
+            text = pc.replace_substring(text, ",", ".")
         try:
             values = text.cast(pa.float64())
         except pa.ArrowInvalid:
@@ -146,18 +174,29 @@ def is_parquet(source: Source) -> bool:
     return source.content[:4] == PARQUET_MAGIC
 
 
-def read(source: Source) -> Table:
+def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -> Table:
     """Read a CSV or Parquet table whole.
 
-    CSV files have a header line; the separator is the first of ``, ; tab`` that the header holds,
-    else runs of spaces. Empty lines and lines that begin with ``#`` are passed over.
+    CSV files have a header line; the separator is that of ``, ; tab`` of which the header and the
+    first row hold equally many, else runs of spaces. Empty lines and lines that begin with ``#``
+    are passed over.
+
+    Parameters
+    ----------
+    source : Source
+    names : sequence of str
+        Of the columns in order, instead of a header line; further columns are named by number.
+    decimal : {'.', ','}, optional
+        None: commas where they stand between digits, no point does, and they do not separate.
 
     Raises
     ------
+    HeadlessError
+        There is no header line.
     InputError
         Neither Parquet nor text, no rows, or lines of differing length.
     """
-    table = _parquet(source) if is_parquet(source) else _csv(source)
+    table = _parquet(source) if is_parquet(source) else _csv(source, names, decimal)
     if len(table) == 0:
         raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
     return table
@@ -170,24 +209,72 @@ def _parquet(source: Source) -> Table:
     )
 
 
-def _csv(source: Source) -> Table:
-    from pyarrow import csv
-
-    text, lines = _counted(source)
-    header, _, body = text.partition(b"\n")
-    separator = next((s for s in _SEPARATORS if s in header), b" ")
+def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
+    text, lines = counted_lines(source)
+    end = text.find(b"\n") if b"\n" in text else len(text)
+    separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
+    names = _cells(text[:end], separator)
+    headless = bool(names) and all(map(_is_number, names))
+    if headless and not given:
+        raise HeadlessError(source.name, int(lines[0]), len(names))
+    body = text if headless else text[end + 1 :]
+    del text
+    remarks = []
+    if given and not headless:
+        remarks.append(f"line {lines[0]} is not read: --columns names the columns")
+    if not headless:
+        lines = lines[1:]
+    if given:
+        names = named(given, len(names), source.name)
     if separator == b" ":
-        # Runs of spaces: one is left of each.
-        header, body = re.sub(rb"[ \t]+", b" ", header), re.sub(rb"[ \t]+", b" ", body)
-        header, body = header.strip(), re.sub(rb"^ | $", b"", body, flags=re.MULTILINE)
+        body = _single_spaces(body)
     elif b'"' in body:
         body = re.sub(re.escape(separator) + rb"[ \t]+\"", separator + b'"', body)
-    names = [name.strip().strip('"').strip() for name in header.decode().split(separator.decode())]
     twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
     if twice is not None:
         raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
+    if decimal is None:
+        points = separator == b"," or _DECIMAL_POINT.search(body)
+        comma = not points and _DECIMAL_COMMA.search(body)
+        decimal = "," if comma else "."
+        if comma:
+            remarks.append("commas between digits read as decimal signs")
+    columns = body_columns(body, names, separator, lines, source.name)
+    rows = len(next(iter(columns.values()), ()))
+    return Table(source.name, columns, lines[:rows], decimal, tuple(remarks))
+
+
+def body_columns(
+    body: bytes, names: Sequence[str], separator: bytes, lines: Integers, name: str
+) -> dict[str, Any]:
+    """Part the rows of a text table.
+
+    Parameters
+    ----------
+    body : bytes
+        The rows alone.
+    names : sequence of str
+        Of the columns.
+    separator : bytes
+    lines : array of int, shape (rows,)
+        The number of each row's line.
+    name : str
+        Of the file, for messages.
+
+    Returns
+    -------
+    dict
+        Arrow arrays of text.
+
+    Raises
+    ------
+    InputError
+        No rows, or one of another length.
+    """
+    from pyarrow import csv
+
     if not body:
-        raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
+        raise InputError(f"{name}: holds no rows; it needs a header and at least one row")
     # As text: numbers are parsed by column, so that a bad cell can be named with its line.
     try:
         table = csv.read_csv(
@@ -201,15 +288,84 @@ def _csv(source: Source) -> Table:
             ),
         )
     except pa.ArrowInvalid as error:
-        raise InputError(f"{source.name}: {_complaint(str(error), lines, len(names))}") from None
-    return Table(
-        source.name,
-        {name: table.column(name).combine_chunks() for name in table.column_names},
-        lines[1 : 1 + table.num_rows],
-    )
+        raise InputError(f"{name}: {_complaint(str(error), lines, len(names))}") from None
+    return {key: table.column(key).combine_chunks() for key in table.column_names}
 
 
-def _counted(source: Source) -> tuple[bytes, Integers]:
+def _cells(header: bytes, separator: bytes) -> list[str]:
+    """Part a header line into names."""
+    if separator == b" ":
+        return header.decode().split()
+    return [name.strip().strip('"').strip() for name in header.decode().split(separator.decode())]
+
+
+def _single_spaces(text: bytes) -> bytes:
+    """Leave one space of each run of blanks, none at the ends of lines."""
+    # Most files are so already, and patterns are slow on a million lines.
+    if b"\t" in text or b"  " in text:
+        text = re.sub(rb"[ \t]+", b" ", text)
+    return text.replace(b"\n ", b"\n").replace(b" \n", b"\n").strip(b" ")
+
+
+def _separator(header: bytes, body: bytes) -> bytes:
+    """Return what parts the columns: what the header and the first row hold equally often."""
+    row = body.partition(b"\n")[0]
+    # The comma last: it may be a decimal sign, the others may not.
+    for separator in (b";", b"\t", b","):
+        if 0 < header.count(separator) == row.count(separator):
+            return separator
+    return next((s for s in _SEPARATORS if s in header), b" ")
+
+
+def _is_number(cell: str) -> bool:
+    return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
+
+
+def named(given: Sequence[str], count: int, source: str) -> list[str]:
+    """Return names for all columns, the given ones first.
+
+    Raises
+    ------
+    InputError
+        There are fewer columns than names.
+    """
+    if len(given) > count:
+        raise InputError(
+            f"{source}: has {count} columns, --columns names {len(given)}: {', '.join(given)}"
+        )
+    return [*given, *(f"column {i}" for i in range(len(given) + 1, count + 1))]
+
+
+def commented_names(source: Source, count: int) -> list[str] | None:
+    """Return the names of a header line that is commented out, as TUM and EuRoC files have it.
+
+    Parameters
+    ----------
+    source : Source
+        A text table without header.
+    count : int
+        Of its columns.
+
+    Returns
+    -------
+    list of str or None
+        None where no line of comment before the rows has that many words.
+    """
+    head = source.content[: 1 << 14].removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace")
+    for line in reversed(list(itertools.takewhile(_is_passed_over, head.splitlines()))):
+        words = line.strip().lstrip("#").strip()
+        for parts in (words.split(","), words.split(";"), words.split()):
+            names = [part.strip() for part in parts]
+            if len(names) == len(set(names)) == count and not any(map(_is_number, names)):
+                return names
+    return None
+
+
+def _is_passed_over(line: str) -> bool:
+    return line.strip()[:1] in ("", "#")
+
+
+def counted_lines(source: Source) -> tuple[bytes, Integers]:
     """Lines of a text file that count, joined, and the number of each."""
     content = source.content.removeprefix(b"\xef\xbb\xbf")
     try:
@@ -233,6 +389,6 @@ def _complaint(error: str, lines: Integers, expected: int) -> str:
     found = re.search(r"Row #(\d+): Expected \d+ columns, got (\d+)", error)
     if found is None:
         return f"cannot be read as a table: {error.strip().splitlines()[0]}"
-    # Arrow counts the rows after the header from 1.
-    line = lines[min(int(found[1]), len(lines) - 1)]
+    # Arrow counts the rows from 1.
+    line = lines[min(int(found[1]), len(lines)) - 1]
     return f"line {line} has {found[2]} columns, the header has {expected}; mend or remove the line"

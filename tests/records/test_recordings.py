@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.records import recordings, tables
-from dmpcli.records.recordings import LAYOUTS, Layout, adapted, stroke
+from dmpcli.records.layouts import LAYOUTS, Layout, adapted
+from dmpcli.records.recordings import stroke
 from dmpcli.records.streams import Source
 
 T = np.linspace(0.0, 1.0, 20)
@@ -168,7 +169,7 @@ def test_any_table_is_read_or_refused_by_name(text):
 def test_lines_that_count_keep_their_numbers(text):
     lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip(" \t")[:1] not in ("", "#")]
-    joined, numbers = tables._counted(Source("any.csv", text.encode()))
+    joined, numbers = tables.counted_lines(Source("any.csv", text.encode()))
     assert joined.decode() == "\n".join(line for _, line in kept)
     if kept:
         assert numbers.tolist() == [i for i, _ in kept]
@@ -177,3 +178,45 @@ def test_lines_that_count_keep_their_numbers(text):
 def test_the_shortest_stroke_has_ten_samples():
     values = np.column_stack([T, XYZ])[: recordings.SHORTEST]
     assert len(stroke(csv(values=values)).t) == 10
+
+
+numbers = st.floats(-1e4, 1e4).map(lambda value: round(value, 6))
+
+
+@given(st.lists(st.tuples(numbers, numbers, numbers), min_size=2, max_size=12), st.data())
+def test_decimal_commas_are_read_as_points_are(rows, data):
+    separator = data.draw(st.sampled_from([";", "\t", " "]))
+    text = "\n".join(
+        [separator.join("abc"), *(separator.join(f"{v:.6f}" for v in r) for r in rows)]
+    )
+    points = tables.read(Source("a.csv", text.encode()), decimal=None)
+    commas = tables.read(Source("a.csv", text.replace(".", ",").encode()), decimal=None)
+    said = tables.read(Source("a.csv", text.replace(".", ",").encode()), decimal=",")
+    for name in "abc":
+        expected = [r["abc".index(name)] for r in rows]
+        np.testing.assert_array_equal(points.numbers(name), expected)
+        np.testing.assert_array_equal(commas.numbers(name), expected)
+        np.testing.assert_array_equal(said.numbers(name), expected)
+    assert commas.remarks == ("commas between digits read as decimal signs",)
+    assert points.remarks == ()
+
+
+@given(
+    st.lists(st.lists(numbers, min_size=3, max_size=3), min_size=2, max_size=9),
+    st.sampled_from([",", ";", "\t", " "]),
+)
+def test_tables_without_header_are_known_by_their_first_line(rows, separator):
+    text = "\n".join(separator.join(f"{v:.6f}" for v in row) for row in rows).encode()
+    with pytest.raises(tables.HeadlessError, match="line 1 holds numbers"):
+        tables.read(Source("a.csv", text))
+    table = tables.read(Source("a.csv", text), ["a", "b", "c"])
+    np.testing.assert_array_equal(np.column_stack([table.numbers(n) for n in "abc"]), rows)
+    assert table.at(1) == "line 2"
+
+
+def test_decimal_commas_are_not_guessed_where_a_point_or_a_comma_means_something_else():
+    mixed = tables.read(Source("a.csv", b"a;b\n1,5;2.5\n"), decimal=None)
+    assert mixed.decimal == "."
+    with pytest.raises(InputError, match=r"'1,5' is not a finite number"):
+        mixed.numbers("a")
+    assert tables.read(Source("a.csv", b"a,b\n1,5\n"), decimal=None).numbers("b").tolist() == [5.0]

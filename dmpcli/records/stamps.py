@@ -1,0 +1,102 @@
+"""Columns of time of any kind, in s, without losing digits: a double holds 1.7e9 s to 0.2 μs only.
+
+Stamps that count from an epoch are counted from the first of them, before they become doubles.
+"""
+
+from typing import Any
+
+import pyarrow as pa
+
+from dmpcli.arrays import Floats
+from dmpcli.records import columns
+from dmpcli.records.layouts import TIME
+from dmpcli.records.tables import Table, is_text
+
+EPOCH = 1e6
+"""A first stamp beyond this, s, counts from an epoch, not from when something was switched on."""
+
+# Twelve digits after the point: 1 ns in units of ns, s or anything between; 25 before it.
+_EXACT = pa.decimal128(37, 12)
+
+
+def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None) -> Floats:
+    """Read time.
+
+    Parameters
+    ----------
+    table : Table
+    column : str
+        Numbers, dates, or text of either.
+    unit : str
+        Of numbers.
+    nanoseconds : str, optional
+        A second column, of nanoseconds within the second; time then counts from the first row.
+
+    Returns
+    -------
+    array, shape (rows,)
+        s; from the first row where that is beyond `EPOCH`.
+
+    Raises
+    ------
+    InputError
+        A value is no time; names the row.
+    """
+    if nanoseconds is not None:
+        t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
+        t -= t[0]
+        return t
+    values: Any = table.columns.get(column)
+    if isinstance(values, pa.Array | pa.ChunkedArray):
+        dates = _dates(values)
+        if dates is not None:
+            return dates
+        exact = _exact(values, table.decimal, TIME[unit])
+        if exact is not None:
+            return exact
+    t = table.numbers(column) * TIME[unit]
+    if len(t) and abs(t[0]) > EPOCH:
+        t -= t[0]
+    return t
+
+
+def _dates(values: Any) -> Floats | None:
+    """Seconds since the first of dates; None where the column holds something else."""
+    try:
+        if is_text(values.type):
+            if len(values) == 0 or b":" not in str(values[0].as_py()).encode():
+                return None
+            zone = str(values[0].as_py()).rstrip().endswith("Z")
+            values = values.cast(pa.timestamp("ns", "UTC" if zone else None))
+        elif not pa.types.is_timestamp(values.type):
+            return None
+        ns = columns.numbers(values.cast(pa.timestamp("ns", values.type.tz)).cast(pa.int64()))
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        return None
+    if values.null_count:
+        return None
+    t: Floats = (ns - ns[0]) * 1e-9
+    return t
+
+
+def _exact(values: Any, decimal: str, factor: float) -> Floats | None:
+    """Seconds since the first of numbers that count from an epoch; None of others, or unclear."""
+    import pyarrow.compute as pc
+
+    try:
+        if is_text(values.type):
+            values = pc.utf8_trim_whitespace(values)
+            if decimal == ",":
+                values = pc.replace_substring(values, ",", ".")
+        elif not pa.types.is_integer(values.type):
+            return None
+        if len(values) == 0 or abs(float(values[0].as_py())) * factor <= EPOCH:
+            return None
+        values = values.cast(_EXACT)
+        since = pc.subtract(values, values[0]).cast(pa.float64())
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError, ValueError, TypeError):
+        return None
+    if since.null_count:
+        return None
+    t: Floats = columns.numbers(since) * factor
+    return t
