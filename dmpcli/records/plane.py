@@ -2,18 +2,17 @@
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field
 
-from dmpcli.errors import InputError
-from dmpcli.records import documents
+from dmpcli.records import directions, documents
 from dmpcli.records.documents import Part
-from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.streams import Source
 from dmpcli.surfaces.plane import Plane
 
 SCHEMA = "plane"
 VERSION = 1
+FORM = '{"point": [x, y, z], "normal": [nx, ny, nz]}'
+"""What people write."""
 
 
 class PlaneFile(Part):
@@ -36,16 +35,12 @@ def decode(source: Source) -> Plane:
     InputError
         Not JSON, another schema, a newer version, or not a point and a normal.
     """
-    remedy = 'a plane is {"point": [x, y, z], "normal": [nx, ny, nz]} in mm'
+    remedy = f"a plane is {FORM} in mm"
     file = documents.validated(source, PlaneFile, SCHEMA, VERSION, remedy, by_hand=True)
-    normal, point = np.array(file.normal), np.array(file.point)
-    if np.abs(point).max() > FARTHEST:
-        raise InputError(f"{source.name}: point: is beyond {FARTHEST:g} mm; check its unit")
-    largest = np.abs(normal).max()
-    if largest == 0.0:
-        raise InputError(f"{source.name}: normal: is zero; it must point off the plane")
-    normal = normal / largest  # so that squares neither overflow nor vanish
-    return Plane(point, normal / np.linalg.norm(normal))
+    return Plane(
+        directions.near(source, "point", file.point),
+        directions.unit(source, "normal", file.normal, "point off the plane"),
+    )
 
 
 def schema() -> dict[str, Any]:

@@ -1,41 +1,99 @@
-"""What ``--surface`` names: a plane file or a mesh file, told apart by content."""
+"""What ``--surface`` names: a plane, cylinder or sphere file or a mesh, told apart by content."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
 
 from dmpcli.errors import InputError
-from dmpcli.records import mesh, plane
+from dmpcli.records import cylinder, documents, mesh, plane, sphere
 from dmpcli.records.mesh import MeshFile
 from dmpcli.records.pose import Pose
 from dmpcli.records.streams import Source
+from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
+from dmpcli.surfaces.sphere import Sphere
+
+Exact = Plane | Cylinder | Sphere
+"""Surfaces that a JSON file gives in closed form."""
+
+MESH = "mesh"
+"""Kind of surfaces that are no JSON file."""
+
+DECODERS: dict[str, Callable[[Source], Exact]] = {
+    plane.SCHEMA: plane.decode,
+    cylinder.SCHEMA: cylinder.decode,
+    sphere.SCHEMA: sphere.decode,
+}
+"""Readers of the files by their schema."""
+
+_KEYS = {"normal": plane.SCHEMA, "axis": cylinder.SCHEMA, "centre": sphere.SCHEMA}
+"""Keys that only one of the kinds has."""
 
 
-def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> Plane | MeshFile:
+def kind_of(document: Mapping[str, Any]) -> str | None:
+    """Tell which kind of surface a JSON object is: by its schema, without one by its keys.
+
+    Returns
+    -------
+    str or None
+        A key of `DECODERS`; None where it is none of them, or could be several.
+    """
+    if "schema" in document:
+        said = document["schema"]
+        return said if isinstance(said, str) and said in DECODERS else None
+    kinds = {kind for key, kind in _KEYS.items() if key in document}
+    return kinds.pop() if len(kinds) == 1 else None
+
+
+def kind(exact: Exact) -> str:
+    """Return the kind of an exact surface, a key of `DECODERS`."""
+    return {Plane: plane.SCHEMA, Cylinder: cylinder.SCHEMA, Sphere: sphere.SCHEMA}[type(exact)]
+
+
+def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> Exact | MeshFile:
     """Read a surface and place it in the robot's base frame.
 
     Parameters
     ----------
     source : Source
-        A plane file (JSON), or a mesh (STL, OBJ, PLY).
+        A plane, cylinder or sphere file (JSON), or a mesh (STL, OBJ, PLY, OFF).
     unit : {'mm', 'cm', 'm', 'in'}, optional
-        Of the mesh file's coordinates; without it mm. Plane files are always in mm.
+        Of the mesh file's coordinates; without it mm. The other files are always in mm.
     pose : Pose, optional
         Where the file's own frame lies in the base frame; without it, they are the same.
 
     Returns
     -------
-    Plane or MeshFile
-        In the base frame, mm. The side of the normals is the file's own.
+    Plane, Cylinder, Sphere or MeshFile
+        In the base frame, mm. The side of the normals is the file's own; outwards on cylinders
+        and spheres.
 
     Raises
     ------
     InputError
-        Neither a plane nor a mesh, or one that is damaged or cannot be mended; by name.
+        None of them, or one that is damaged or cannot be mended; by name.
     """
-    if source.content.lstrip()[:1] == b"{":
-        if unit not in (None, "mm"):
-            raise InputError(f"{source.name}: plane files are in mm; leave --surface-unit out")
-        flat = plane.decode(source)
-        if pose is None:
-            return flat
-        return Plane(pose.to_base(flat.point), pose.rotation @ flat.normal)
-    found = mesh.decode(source, unit or "mm", "--surface-unit")
-    return found if pose is None else found._replace(V=pose.to_base(found.V))
+    if source.content.lstrip()[:1] != b"{":
+        found = mesh.decode(source, unit or "mm", "--surface-unit")
+        return found if pose is None else found._replace(V=pose.to_base(found.V))
+    document = documents.json_document(source)
+    name = kind_of(document)
+    if name is None:
+        said = document.get("schema")
+        is_not = "tells no surface" if said is None else f"has schema {said!r}, not a surface's"
+        raise InputError(
+            f"{source.name}: {is_not}: a plane is {plane.FORM}, a cylinder {cylinder.FORM}, "
+            f"a sphere {sphere.FORM}, in mm"
+        )
+    if unit not in (None, "mm"):
+        raise InputError(f"{source.name}: {name} files are in mm; leave --surface-unit out")
+    exact = DECODERS[name](source)
+    return exact if pose is None else _placed(exact, pose)
+
+
+def _placed(exact: Exact, pose: Pose) -> Exact:
+    if isinstance(exact, Plane):
+        return Plane(pose.to_base(exact.point), pose.rotation @ exact.normal)
+    if isinstance(exact, Cylinder):
+        return replace(exact, point=pose.to_base(exact.point), axis=pose.rotation @ exact.axis)
+    return replace(exact, centre=pose.to_base(exact.centre))

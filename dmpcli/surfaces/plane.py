@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.protocol import Connections, Hits, Lift, Status, Walks, towards
 from dmpcli.surfaces.vectors import across, dot, length, turned, unit
 
@@ -108,6 +108,11 @@ class PlaneCharts:
     def __len__(self) -> int:
         return len(self.origin)
 
+    def rows(self, rows: Integers) -> "PlaneCharts":
+        """Return the charts of some of the pairs."""
+        goal = None if self.goal is None else self.goal[rows]
+        return PlaneCharts(self.origin[rows], self.axes[rows], goal, self.closed)
+
     @property
     def normal(self) -> Floats:
         """Unit normals, shape (B, 3)."""
@@ -135,6 +140,10 @@ class PlaneCharts:
         """Chart coordinates (B, T, 3) of positions (B, T, 3), mm."""
         coordinates: Floats = (position - self.origin[:, None]) @ self.axes
         return coordinates
+
+    def over(self, points: Floats) -> Booleans:
+        """All of points (B, T, 3): there is no border."""
+        return np.ones(points.shape[:2], dtype=bool)
 
     def lift(self, coordinates: Floats) -> Lift:
         """Carry chart coordinates (B, T, 3), mm, to the plane: one rigid transform per pair."""
@@ -263,15 +272,30 @@ def pair_charts(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Pl
     return PlaneCharts(start, open_axes(e_u, normal), goal)
 
 
-def _across(direction: Floats, tool_axis: Floats | None) -> Floats:
-    """Return the normal of the plane along `direction` that lies most across the tool axis."""
-    preferred = np.array([0.0, 0.0, 1.0]) if tool_axis is None else -tool_axis
+def across_line(direction: Floats, preferred: Floats) -> Floats:
+    """Return the normal across a line that is closest to a preferred one.
+
+    Parameters
+    ----------
+    direction, preferred : array, shape (3,)
+        Unit vectors; where they are parallel, base z and then base y is preferred instead.
+
+    Returns
+    -------
+    array, shape (3,)
+        Unit vector.
+    """
     for axis in (preferred, np.eye(3)[2], np.eye(3)[1]):
         normal = axis - (axis @ direction) * direction
         length = np.linalg.norm(normal)
         if length > 1e-3:
             return np.asarray(normal / length)
     raise AssertionError("one of two perpendicular axes is always across a direction")
+
+
+def _across(direction: Floats, tool_axis: Floats | None) -> Floats:
+    """Return the normal of the plane along `direction` that lies most across the tool axis."""
+    return across_line(direction, np.eye(3)[2] if tool_axis is None else -tool_axis)
 
 
 def _towards_tool(normal: Floats, tool_axis: Floats | None) -> Floats:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.protocol import Lift, Status, Surface, Walks, towards
 from dmpcli.surfaces.vectors import across, cross, turned
 
@@ -47,6 +47,23 @@ class WalkedCharts:
 
     def __len__(self) -> int:
         return len(self.origin)
+
+    def rows(self, rows: Integers) -> "WalkedCharts":
+        """Return the charts of some of the pairs."""
+        return WalkedCharts(
+            self.walk,
+            self.origin[rows],
+            self.direction[rows],
+            self.sign[rows],
+            self.lengths[rows],
+            self.goals[rows],
+            self.status[rows],
+            self.reach,
+        )
+
+    def over(self, points: Floats) -> Booleans:
+        """All of points (B, T, 3): there is no border."""
+        return np.ones(points.shape[:2], dtype=bool)
 
     def lift(self, coordinates: Floats) -> Lift:
         """Carry chart coordinates (B, T, 3), mm, to the surface."""

@@ -1,0 +1,130 @@
+"""The surface that ``--surface`` names, with ``--surface-pose`` and ``--surface-unit``."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dmpcli.errors import InputError
+
+if TYPE_CHECKING:
+    from dmpcli.records.pose import Pose
+    from dmpcli.surfaces.protocol import Surface
+
+
+@dataclass(frozen=True)
+class SurfaceInput:
+    """A surface and where it came from.
+
+    Attributes
+    ----------
+    path : Path
+    surface : Surface
+        In the base frame, mm.
+    kind : {'plane', 'cylinder', 'sphere', 'mesh'}
+    sha256 : str
+        Of the file.
+    unit : str
+        Of its lengths.
+    pose : Pose or None
+        Where the file's own frame lies in the base frame; None where they are the same.
+    options : dict
+        For provenance: ``surface_pose`` where it was given as numbers.
+    inputs : list of dict
+        For provenance: role and sha256 of the files that were read.
+    """
+
+    path: Path
+    surface: "Surface"
+    kind: str
+    sha256: str
+    unit: str
+    pose: "Pose | None"
+    options: dict[str, Any] = field(default_factory=dict)
+    inputs: list[dict[str, str]] = field(default_factory=list)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Kind, sha256, unit and pose (X Y Z RX RY RZ, mm and rad, or None), as a skill keeps."""
+        from dmpcli import rotations
+
+        six = None
+        if self.pose is not None:
+            six = [*self.pose.position.tolist(), *rotations.to_euler(self.pose.rotation).tolist()]
+        return {"kind": self.kind, "sha256": self.sha256, "unit": self.unit, "pose": six}
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """File, sha256, kind, unit and pose as given, as a report names them."""
+        pose = self.options.get("surface_pose")
+        if pose is None and self.pose is not None:
+            pose = {"sha256": self.inputs[-1]["sha256"]}
+        return {"file": self.path.name, "sha256": self.sha256, "unit": self.unit, "pose": pose}
+
+
+def check_options(surface: Path | None, pose: str | None, unit: str | None) -> None:
+    """Refuse a pose or a unit of no surface.
+
+    Raises
+    ------
+    InputError
+        Names both options.
+    """
+    if surface is None and (pose is not None or unit is not None):
+        raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
+
+
+def read(
+    path: Path, pose: str | None, unit: str | None, quiet: bool, summary: bool = False
+) -> SurfaceInput:
+    """Read a surface, place it in the base frame, and say what is odd about it.
+
+    Parameters
+    ----------
+    path : Path
+        A plane, cylinder or sphere file, or a mesh.
+    pose : str, optional
+        ``X Y Z RX RY RZ`` in mm and rad, or a pose file.
+    unit : str, optional
+        Of a mesh file's lengths; without it mm.
+    quiet : bool
+        Say nothing.
+    summary : bool
+        Also say how fine a mesh is: its facets bound every accuracy.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read or is none of them, a wrong pose or unit; by name.
+    """
+    from dmpcli.commands.messages import tell
+    from dmpcli.records import mesh as mesh_file
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import streams
+    from dmpcli.records import surface as surface_file
+    from dmpcli.records.mesh import MeshFile
+    from dmpcli.surfaces.mesh import Mesh
+
+    source = streams.read(path)
+    inputs = [{"role": "surface", "sha256": source.sha256}]
+    options: dict[str, Any] = {}
+    placed = None
+    if pose is not None:
+        placed, pose_source = pose_file.parse(pose, "--surface-pose")
+        if pose_source is None:
+            options["surface_pose"] = [float(word) for word in pose.split()]
+        else:
+            inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
+    waiting = mesh_file.waiting(source)
+    if waiting is not None:
+        tell(waiting, quiet)
+    found = surface_file.load(source, unit, placed)
+    shape: Surface
+    if isinstance(found, MeshFile):
+        for remark in found.remarks:
+            tell(f"{path}: {remark}", quiet)
+        kind, shape = surface_file.MESH, Mesh(found.V, found.F)
+        if summary:
+            tell(f"{path}: {mesh_file.summary(found, shape)}", quiet)
+    else:
+        kind, shape = surface_file.kind(found), found
+    return SurfaceInput(path, shape, kind, source.sha256, unit or "mm", placed, options, inputs)

@@ -1,0 +1,38 @@
+"""Points and directions that people write into files: checked, and named where they are wrong."""
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.records.pairs import FARTHEST
+from dmpcli.records.streams import Source
+
+
+def near(source: Source, field: str, numbers: list[float]) -> Floats:
+    """Return a point, shape (3,), mm.
+
+    Raises
+    ------
+    InputError
+        It is beyond `FARTHEST`.
+    """
+    point = np.array(numbers, dtype=float)
+    if np.abs(point).max() > FARTHEST:
+        raise InputError(f"{source.name}: {field}: is beyond {FARTHEST:g} mm; check its unit")
+    return point
+
+
+def unit(source: Source, field: str, numbers: list[float], purpose: str) -> Floats:
+    """Return a direction of any length as a unit vector, shape (3,).
+
+    Raises
+    ------
+    InputError
+        It is zero; the message says what it must do, `purpose`.
+    """
+    direction = np.array(numbers, dtype=float)
+    largest = np.abs(direction).max()
+    if largest == 0.0:
+        raise InputError(f"{source.name}: {field}: is zero; it must {purpose}")
+    direction = direction / largest  # so that squares neither overflow nor vanish
+    return np.asarray(direction / np.linalg.norm(direction))
