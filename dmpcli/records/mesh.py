@@ -1,20 +1,28 @@
-"""Mesh files: STL, OBJ or PLY in, a checked and mended mesh in mm out."""
+"""Mesh files: STL, OBJ, PLY or OFF in, a checked and mended mesh in mm out."""
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records.mesh_formats import triangles
-from dmpcli.records.recordings import LENGTH
+from dmpcli.records.layouts import LENGTH
+from dmpcli.records.mesh_formats import looks_like_mesh, triangles
+from dmpcli.records.mesh_polygons import Triangles
 from dmpcli.records.streams import Source
+
+if TYPE_CHECKING:
+    from dmpcli.surfaces.mesh import Mesh
 
 UNITS = LENGTH
 """mm in each unit of length that a mesh file may be in."""
 
 SMALL, LARGE = 1.0, 20_000.0
 """mm. A part outside of these is more likely in another unit than meant so."""
+
+
+LONG = 20_000_000
+"""Bytes. Reading a mesh of more takes some seconds."""
 
 
 class MeshFile(NamedTuple):
@@ -52,33 +60,57 @@ def decode(source: Source, unit: str = "mm", option: str = "--unit") -> MeshFile
     InputError
         An unknown unit, not a mesh, a damaged file, or a mesh that is not safe to mend; by name.
     """
-    from dmpcli.surfaces.mending import mended
-
     if unit not in UNITS:
         raise InputError(f"{option} {unit}: must be one of {', '.join(UNITS)}")
-    V, F = triangles(source)
+    return _decoded(source.name, triangles(source), unit)
+
+
+def _decoded(name: str, found: Triangles, unit: str) -> MeshFile:
+    from dmpcli.surfaces.mending import mended
+
     try:
-        mesh = mended(V * UNITS[unit], F)
+        mesh = mended(found.V * UNITS[unit], found.F)
     except InputError as error:
-        raise InputError(f"{source.name}: {error}") from None
-    remarks = list(mesh.remarks)
+        raise InputError(f"{name}: {error}") from None
+    remarks = found.remarks + mesh.remarks
     size = float(np.linalg.norm(np.ptp(mesh.V, axis=0)))
     if not SMALL < size < LARGE:
         remarks.append(f"it measures {size:.3g} mm across as {unit}: check its unit of length")
     return MeshFile(mesh.V, mesh.F, remarks)
 
 
-def summary(mesh: MeshFile) -> str:
-    """Say in one line how large and how fine a mesh is: its facets bound every accuracy."""
+def waiting(source: Source) -> str | None:
+    """Say that a file which looks like a mesh takes a while to read; None where it does not."""
+    if len(source.content) <= LONG or not looks_like_mesh(source):
+        return None
+    return f"{source.name}: reading a mesh of {len(source.content) / 1e6:.0f} MB takes a while"
+
+
+def summary(mesh: MeshFile, shape: "Mesh | None" = None) -> str:
+    """Say in one line how large, fine and noisy a mesh is: its facets bound every accuracy.
+
+    Parameters
+    ----------
+    mesh : MeshFile
+    shape : Mesh, optional
+        The same, where it is made already.
+    """
     from dmpcli.surfaces.chordal import chordal_error
     from dmpcli.surfaces.mending import components
+    from dmpcli.surfaces.mesh import Mesh
 
     error = chordal_error(mesh.V, mesh.F)
-    pieces = components(mesh.F)
+    pieces, noisy = components(mesh.F), (shape or Mesh(mesh.V, mesh.F)).noisy_share
+    rough = f"; {_percent(noisy)} of its area is noisy, normals are averaged there"
     return (
         f"{len(mesh.F)} faces, {pieces} {'piece' if pieces == 1 else 'pieces'}, chordal error "
         f"estimated at {error.median:.2g} mm, at most {error.largest:.2g} mm"
+        f"{rough if noisy > 0.0 else ''}"
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
 
 
 def description(source: Source) -> dict[str, Any]:
@@ -90,25 +122,30 @@ def description(source: Source) -> dict[str, Any]:
         A damaged file, or a mesh that is not safe to mend; by name.
     """
     from dmpcli.surfaces.chordal import chordal_error
+    from dmpcli.surfaces.extent import area, volume
     from dmpcli.surfaces.mending import borders, components
+    from dmpcli.surfaces.mesh import Mesh
 
-    facets = len(triangles(source)[1])
-    mesh = decode(source)
+    found = triangles(source)
+    mesh = _decoded(source.name, found, "mm")
     error, (edges, rims) = chordal_error(mesh.V, mesh.F), borders(mesh.F)
     low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
     return {
         "vertices": len(mesh.V),
         "faces": len(mesh.F),
-        "faces_in_file": facets,
+        "faces_in_file": len(found.F),
         "pieces": components(mesh.F),
         "border_edges": edges,
         "borders": rims,
+        "area": area(mesh.V, mesh.F),
+        "volume": volume(mesh.V, mesh.F),
         "least": low.tolist(),
         "largest": high.tolist(),
         "size": (high - low).tolist(),
         "likely_unit": _likely_unit(float(np.linalg.norm(high - low))),
         "error_median": error.median,
         "error_largest": error.largest,
+        "noisy_share": Mesh(mesh.V, mesh.F).noisy_share,
         "remarks": mesh.remarks,
     }
 

@@ -1,11 +1,11 @@
 """Charts of a mesh: which geodesic each pair gets, and which way its strokes are carried."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces import shooting, strip, unfolding
+from dmpcli.surfaces import last_check, shooting, strip, unfolding
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.nodes import Centre
 from dmpcli.surfaces.protocol import Lift, Status, Walks, first_refusal, towards
@@ -17,6 +17,9 @@ from dmpcli.surfaces.walked import closed_direction, goal_coordinates, walk_samp
 COINCIDENT = 1e-6
 # A stroke that is walked over a crease is followed this much at a time to see whether it folds, mm.
 _LEAST_MOVE = 1e-3
+# Points beside the border by more than this, mm, and by more than this part of their distance to
+# the mesh, are surely not over it.
+_BESIDE, _LEANING = 1.0, 0.2
 _FLAT = np.cos(np.radians(10.0))
 
 
@@ -51,12 +54,43 @@ class MeshCharts:
     def __len__(self) -> int:
         return len(self.lengths)
 
+    def rows(self, rows: Integers) -> "MeshCharts":
+        """Return the charts of some of the pairs."""
+        return MeshCharts(
+            self.mesh,
+            self.centre.rows(rows),
+            self.target[rows],
+            self.lengths[rows],
+            self.goals[rows],
+            self.status[rows],
+            self.creased[rows],
+        )
+
+    def over(self, points: Floats) -> Booleans:
+        """Tell which points (B, T, 3) are not beside the mesh; doubtful ones are over it.
+
+        The closest point of a border is nearest to points that lean outwards with the smooth
+        normal too.
+        """
+        hits = self.mesh.closest(points)
+        gap = points - hits.position
+        sideways = length(gap - dot(gap, hits.normal) * hits.normal)[..., 0]
+        far = np.flatnonzero(sideways > _BESIDE + _LEANING * hits.distance)
+        beside = np.zeros(sideways.size, dtype=bool)
+        beside[far] = self.mesh.beyond_border(
+            points.reshape(-1, 3)[far],
+            hits.position.reshape(-1, 3)[far],
+            hits.face.reshape(-1)[far],
+        )
+        return ~beside.reshape(sideways.shape)
+
     def lift(self, coordinates: Floats) -> Lift:
         """Carry chart coordinates (B, T, 3), mm, to the mesh; see `Lift`."""
         shape = coordinates.shape
         foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
         axes = np.broadcast_to(np.eye(3), (*shape[:2], 3, 3)).copy()
         outside, status = np.ones(shape[:2], dtype=bool), self.status.copy()
+        face, stretch = np.full(shape[:2], -1), np.ones(shape[:2])
         unfolded = self.creased & (status == Status.DRAWN)
         smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
         if len(smooth):
@@ -65,32 +99,74 @@ class MeshCharts:
             foot[smooth] = part.foot
             e_u = cross(part.across, part.normal)
             axes[smooth] = np.stack([e_u, part.across, part.normal], axis=-1)
-            outside[smooth] = part.outside
+            outside[smooth], face[smooth], stretch[smooth] = part.outside, part.face, part.stretch
             status[smooth] = np.where(part.sharp, Status.DRAWN, part.status)
             unfolded[smooth[part.sharp]] = True
+            self._stop_at_slits(smooth, foot, outside, status)
             better = smooth[part.slivers & ~part.sharp & (part.status == Status.DRAWN)]
             if len(better):
-                self._improve(better, coordinates[better], foot, axes)
-        if self.mesh.noise > 0.0:
-            # Straight lines over noisy facets go astray by millimetres.
-            status[unfolded], unfolded[:] = Status.NOISY, False
+                face[self._improve(better, coordinates[better], foot, axes)] = -1
         creased = np.flatnonzero(unfolded)
         if len(creased):
             foot[creased], axes[creased], outside[creased], status[creased] = self._unfold(
                 creased, coordinates[creased]
             )
+            face[creased], stretch[creased] = -1, 1.0
+            # Straight lines over noisy facets go astray by millimetres.
+            noisy = creased[self._crosses_noise(foot[creased])]
+            status[noisy], unfolded[noisy] = Status.NOISY, False
+        # A stroke that is torn at a corner goes backwards there too, which is no fold.
+        walked = unfolded & (status == Status.FOLDED)
+        drawn = np.flatnonzero((status == Status.DRAWN) | (status == Status.BORDER) | walked)
+        feet = last_check.Feet(coordinates, foot, axes[..., 2], face, stretch, outside)
+        status[drawn] = first_refusal(self._checked(drawn, feet), status[drawn])
         position = foot + coordinates[..., 2:] * axes[..., 2]
         return Lift(position, axes, outside, status, unfolded)
 
-    def _improve(self, rows: Integers, coordinates: Floats, foot: Floats, axes: Floats) -> None:
-        """Put the strokes of some pairs where unfolding leads, if it confirms the strip's.
+    def _stop_at_slits(
+        self, rows: Integers, foot: Floats, outside: Booleans, status: Integers
+    ) -> None:
+        """Mark the strokes of some pairs that step over an edge where sheets touch."""
+        if len(self.mesh.slits) == 0:
+            return
+        crossed = self.mesh.slits.crossed(self.mesh, foot[rows])
+        outside[rows] |= crossed
+        hit = rows[crossed.any(axis=1)]
+        status[hit] = first_refusal(status[hit], np.full(len(hit), Status.BORDER))
+
+    def _checked(self, rows: Integers, feet: last_check.Feet) -> Integers:
+        """What is wrong with some of the strokes, as `Status`."""
+        some = feet
+        if len(rows) < len(self):
+            some = last_check.Feet(*(getattr(feet, field.name)[rows] for field in fields(feet)))
+        unknown = np.flatnonzero(some.face[:, 0] < 0)
+        if len(unknown):
+            walked = some.position[unknown]
+            found = self.mesh.search(walked.reshape(-1, 3))[1]
+            some.face[unknown] = found.reshape(walked.shape[:2])
+        origin = self.centre.origin[rows]
+        return last_check.refusals(self.mesh, some, origin, self.target[rows], self.goals[rows])
+
+    def _crosses_noise(self, foot: Floats) -> Booleans:
+        """Tell which strokes (R, T, 3) on the mesh come over noisy facets, shape (R,)."""
+        if not self.mesh.noise.any():
+            return np.zeros(len(foot), dtype=bool)
+        face = self.mesh.search(foot.reshape(-1, 3))[1].reshape(foot.shape[:2])
+        return np.asarray((self.mesh.noise[face] > 0.0).any(axis=1))
+
+    def _improve(self, rows: Integers, coordinates: Floats, foot: Floats, axes: Floats) -> Integers:
+        """Put the strokes of some pairs where unfolding leads, if it confirms the strip's: which.
 
         Where it does not, a cross line met a border or a hole that the strip was carried over.
         """
         exact, turned, _, status = self._unfold(rows, coordinates)
-        near = length(exact - foot[rows])[..., 0].max(axis=1) <= self.mesh.reach
+        face = self.mesh.search(exact.reshape(-1, 3))[1].reshape(exact.shape[:2])
+        apart = length(exact - foot[rows])[..., 0]
+        near = (apart <= self.mesh.reach[face]).all(axis=1)
         good = near & (status == Status.DRAWN)
         foot[rows[good]], axes[rows[good]] = exact[good], turned[good]
+        better: Integers = rows[good]
+        return better
 
     def _unfold(
         self, rows: Integers, coordinates: Floats
@@ -196,6 +272,9 @@ def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
         return Link(direction, normal, step, lengths, status, creased)
     first = _aim(centre.rows(rows), goal[rows])
     aim, ends, good = shooting.hit(mesh, first, shooting.by_steps)
+    # What stands over the goal by no more than the rounding of facets may belong beside it.
+    landed, face = mesh.search(ends.position)
+    good &= length(landed - first.goal)[:, 0] <= shooting.HIT + mesh.noise[face]
     creases = np.flatnonzero(ends.sharp | ~good)
     if len(creases):
         again, there, good[creases] = shooting.hit(mesh, first.rows(creases), shooting.by_facets)
@@ -204,7 +283,8 @@ def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
     creased[rows[creases]] = True
     direction[rows], normal[rows] = aim.direction, ends.normal
     lengths[rows], step[rows] = aim.length[:, 0], aim.length / aim.steps[:, None]
-    status[rows] = np.where(good, Status.DRAWN, Status.NO_GEODESIC)
+    short = last_check.shorter_than_chord(mesh, first.origin, first.goal, aim.length[:, 0])
+    status[rows] = np.where(good, np.where(short, Status.TORN, Status.DRAWN), Status.NO_GEODESIC)
     return Link(direction, normal, step, lengths, status, creased)
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -34,7 +34,8 @@ class Mended:
     Attributes
     ----------
     V : array, shape (n, 3)
-        Vertices, all referenced, no two at one point unless they belong to sheets that only touch.
+        Vertices, all referenced, no two at one point unless sheets touch there: along an edge that
+        three faces or more shared, which is a border of each of them now, or in one point.
     F : array, shape (m, 3)
         Faces with area, none twice, every edge between two at most, wound consistently within each
         component.
@@ -64,13 +65,22 @@ def mended(V: Floats, F: Integers) -> Mended:
     Raises
     ------
     InputError
-        No faces, an index out of range, a coordinate that is not finite or too large, an edge of
-        three faces or more, or a one-sided component; says which and where.
+        No faces, an index out of range, a coordinate that is not finite or too large, or a
+        one-sided component; says which and where.
     """
     draft, remark = _checked(V, F)
     remarks = [remark]
     tolerance = MERGE * float(np.abs(draft.V).max())
-    steps = (_merged, _welded, _without_thin_faces, _without_twins, _stitched, _oriented, _parted)
+    steps = (
+        _merged,
+        _welded,
+        _without_thin_faces,
+        _without_twins,
+        _stitched,
+        _forked,
+        _parted,
+        _oriented,
+    )
     for step in steps:
         draft, remark = step(draft, tolerance)
         remarks.append(remark)
@@ -129,10 +139,11 @@ class _Edges:
 
 @dataclass(frozen=True)
 class _Draft:
-    """Vertices and faces between two steps."""
+    """Vertices and faces between two steps, and the vertices of edges that were crowded."""
 
     V: Floats
     F: Integers
+    forks: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @cached_property
     def edges(self) -> _Edges:
@@ -315,15 +326,6 @@ def _on_border_edges(draft: _Draft, tolerance: float) -> dict[int, tuple[int, in
 
 def _oriented(draft: _Draft, _: float) -> tuple[_Draft, str]:
     """Turn faces over so that neighbours agree; each component keeps what most of it had."""
-    crowded = draft.edges.half[draft.edges.crowded]
-    if len(crowded):
-        number = len(np.unique(np.sort(crowded, axis=1), axis=0))
-        x, y, z = draft.V[crowded[0]].mean(axis=0)
-        raise InputError(
-            f"{_count(number, 'edge belongs', 'edges belong')} to three faces or more, "
-            f"the first at ({x:.6g}, {y:.6g}, {z:.6g}) mm, so that the surface forks there; "
-            "remove inner walls, or export the sides one by one"
-        )
     if not draft.edges.at_odds.any():
         return draft, ""
     turned, component = igl.bfs_orient(draft.F)
@@ -340,21 +342,74 @@ def _oriented(draft: _Draft, _: float) -> tuple[_Draft, str]:
     return _Draft(draft.V, turned), remark
 
 
+def _forked(draft: _Draft, _: float) -> tuple[_Draft, str]:
+    """Make edges of three faces or more borders of each of these, which `_parted` takes apart.
+
+    Two of the faces may be joined about both ends of such an edge, as the faces of a solid that
+    touches another one along it are: parting leaves them their common edge. They get a vertex of
+    their own each in its middle.
+    """
+    crowded = draft.edges.half[draft.edges.crowded]
+    if len(crowded) == 0:
+        return draft, ""
+    number = len(np.unique(np.sort(crowded, axis=1), axis=0))
+    x, y, z = draft.V[crowded[0]].mean(axis=0)
+    draft = _Draft(draft.V, draft.F, np.unique(crowded))
+    while len(half := _still_joined(draft)):
+        V, F, m = draft.V, draft.F, len(draft.F)
+        face, first = np.unique(half % m, return_index=True)
+        half = half[first]
+        (a, b), opposite = draft.edges.half[half].T, F[face, half // m]
+        middle = len(V) + np.arange(len(half))
+        F = F.copy()
+        F[face] = np.stack([a, middle, opposite], axis=1)
+        F = np.concatenate([F, np.stack([middle, b, opposite], axis=1)])
+        draft = _Draft(np.concatenate([V, (V[a] + V[b]) / 2.0]), F, draft.forks)
+    remark = (
+        f"{_count(number, 'edge')} of three faces or more, the first at ({x:.6g}, {y:.6g}, "
+        f"{z:.6g}) mm: sheets touch there, and no stroke is drawn across"
+    )
+    return draft, remark
+
+
+def _still_joined(draft: _Draft) -> Integers:
+    """Half edges of crowded edges that another one runs along between the same two fans."""
+    edges, m = draft.edges, len(draft.F)
+    half = edges.crowded
+    if len(half) == 0:
+        return half
+    fan = _fans(draft)
+    ends = np.stack([fan[(half // m + k) % 3 * m + half % m] for k in (1, 2)], axis=1)
+    _, of, uses = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return half[uses[of.reshape(-1)] > 1]
+
+
+def _fans(draft: _Draft) -> Integers:
+    """Number the fans of faces about vertices, joined by edges of two faces: of each corner (3m,).
+
+    Corners are numbered as half edges are: k m + i for corner k of face i.
+    """
+    F, edges, m = draft.F, draft.edges, len(draft.F)
+    one, other = edges.one, edges.other
+    start, end = ((one // m + k) % 3 * m + one % m for k in (1, 2))
+    there = [(other // m + k) % 3 * m + other % m for k in (1, 2)]
+    odd = edges.at_odds
+    pairs = np.concatenate(
+        [
+            np.stack([start, np.where(odd, there[0], there[1])], axis=1),
+            np.stack([end, np.where(odd, there[1], there[0])], axis=1),
+        ]
+    )
+    return _groups(3 * m, pairs)[1] if len(F) else np.empty(0, dtype=np.int64)
+
+
 def _parted(draft: _Draft, _: float) -> tuple[_Draft, str]:
-    """Give every fan of faces its own vertex where sheets touch in one point (bow-ties)."""
-    V, F, edges = draft.V, draft.F, draft.edges
-    m = len(F)
-    # Across half edge h, its start's corner of this face is followed by its end's of the next one.
-    following = np.full(3 * m, -1)
-    for h, twin in ((edges.one, edges.other), (edges.other, edges.one)):
-        following[(h // m + 1) % 3 * m + h % m] = (twin // m + 2) % 3 * m + twin % m
-    has_next = following >= 0
-    start = np.concatenate([[0], np.cumsum(has_next)])
-    graph = csr_array((has_next[has_next], following[has_next], start), shape=(3 * m, 3 * m))
-    fans, fan = connected_components(graph, directed=False)
-    owner = np.empty(fans, dtype=np.int64)
+    """Give every fan of faces its own vertex where sheets touch (bow-ties, crowded edges)."""
+    V, F, m = draft.V, draft.F, len(draft.F)
+    fan = _fans(draft)
+    owner = np.empty(int(fan.max()) + 1, dtype=np.int64)
     owner[fan] = F.T.ravel()
-    number = np.full(fans, -1)
+    number = np.full(len(owner), -1)
     used, keeps = np.unique(owner, return_index=True)
     number[keeps] = used
     added = np.flatnonzero(number < 0)
@@ -362,5 +417,6 @@ def _parted(draft: _Draft, _: float) -> tuple[_Draft, str]:
         return draft, ""
     number[added] = len(V) + np.arange(len(added))
     V = np.concatenate([V, V[owner[added]]])
-    remark = f"{_count(len(added), 'bow-tie')} parted: sheets that touch in one point"
+    ties = int((~np.isin(owner[added], draft.forks)).sum())
+    remark = f"{_count(ties, 'bow-tie')} parted: sheets that touch in one point" if ties else ""
     return _Draft(V, number[fan].reshape(3, m).T.copy()), remark

@@ -12,8 +12,11 @@ from dmpcli.surfaces.topology import Topology
 from dmpcli.surfaces.vectors import cross, dot, length, unit
 
 if TYPE_CHECKING:
+    from igl import AABB
+
     from dmpcli.surfaces.charts import MeshCharts
     from dmpcli.surfaces.developable import Developable
+    from dmpcli.surfaces.slits import Slits
 
 # Where facets meet at more than this the edge is meant to be sharp: normals are not smoothed
 # across it, and a strip whose normal turns as much within one step is unfolded instead, degrees.
@@ -38,17 +41,21 @@ class Mesh:
     """
 
     def __init__(self, V: Floats, F: Integers) -> None:
-        import igl
-
         self.V = np.ascontiguousarray(V, dtype=float)
         self.F = np.ascontiguousarray(F, dtype=np.int64)
         self.topology = Topology(self.F, len(self.V))
-        self._tree = igl.AABB()
-        self._tree.init(self.V, self.F)
 
     def __reduce__(self) -> tuple[type["Mesh"], tuple[Floats, Integers]]:
-        # The search tree does not travel to another process; it is built there again.
+        # What was built does not travel to another process; it is built there again.
         return Mesh, (self.V, self.F)
+
+    @cached_property
+    def _tree(self) -> "AABB":
+        import igl
+
+        tree = igl.AABB()
+        tree.init(self.V, self.F)
+        return tree
 
     @cached_property
     def corners(self) -> Floats:
@@ -62,25 +69,43 @@ class Mesh:
         return unit(cross(b - a, c - a))
 
     @cached_property
+    def planes(self) -> Floats:
+        """Unit normals of the facets and their distances from the origin, shape (m, 4)."""
+        distance = dot(self.face_normals, self.corners[:, 0])
+        return np.concatenate([self.face_normals, distance], axis=1)
+
+    @cached_property
     def corner_normals(self) -> Floats:
         """Smooth normals at the corners of the faces, shape (m, 3, 3).
 
         Weighted by the corners' angles (G. Thürmer, C. Wüthrich: Computing vertex normals from
         polygonal facets. Journal of Graphics Tools 3 (1998) 43-46); at creases each side has its
-        own. Of noisy scans they are averages over several edges.
+        own. Where the mesh is noisy they are averages over several edges.
         """
         import igl
 
-        if self.noise > 0.0:
-            return averaged(self._vertex_normals, self.F)[self.F]
         normals = self._vertex_normals[self.F]
         sharp = self.dihedrals > CREASE
         if sharp.any():
-            at = np.zeros(len(self.V), dtype=bool)
-            at[self.F[sharp]] = at[np.roll(self.F, -1, axis=1)[sharp]] = True
             split = igl.per_corner_normals(self.V, self.F, CREASE).reshape(-1, 3, 3)
-            normals = np.where(at[self.F][..., None], split, normals)
+            normals = np.where(self._ends(sharp)[self.F][..., None], split, normals)
+        noisy = self.noise > 0.0
+        if noisy.any():
+            # Creases of smooth faces are creases beside noise too.
+            apart = sharp & ~noisy[:, None]
+            among = averaged(self._vertex_normals, self.F[~apart.any(axis=1)])
+            joined = np.zeros(len(self.V), dtype=bool)
+            joined[self.F[noisy]] = True
+            joined &= ~self._ends(apart)
+            over = noisy[:, None] | joined[self.F]
+            normals = np.where(over[..., None], among[self.F], normals)
         return unit(normals)
+
+    def _ends(self, edges: Booleans) -> Booleans:
+        """Vertices, shape (n,), at the ends of edges marked (m, 3)."""
+        at = np.zeros(len(self.V), dtype=bool)
+        at[self.F[edges]] = at[np.roll(self.F, -1, axis=1)[edges]] = True
+        return at
 
     @cached_property
     def _vertex_normals(self) -> Floats:
@@ -90,10 +115,17 @@ class Mesh:
         return np.asarray(igl.per_vertex_normals(self.V, self.F, weighting))
 
     @cached_property
-    def noise(self) -> float:
-        """Estimated standard deviation of a scan's vertices, mm; 0 of a smooth mesh."""
-        of = (self.face_normals, self._vertex_normals, self.F, self.dihedrals, self.edge_length)
-        return noise(*of)
+    def noise(self) -> Floats:
+        """Estimated standard deviation of vertices about each face, (m,), mm; 0 where smooth."""
+        of = (self.corners, self.face_normals, self._vertex_normals, self.dihedrals)
+        return noise(*of, self.topology)
+
+    @property
+    def noisy_share(self) -> float:
+        """Share of the area that is noisy, 0 to 1."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        area = length(cross(b - a, c - a))[:, 0]
+        return float(area[self.noise > 0.0].sum() / area.sum())
 
     @cached_property
     def dihedrals(self) -> Floats:
@@ -140,6 +172,13 @@ class Mesh:
         """Faces with a corner on the border, shape (m,)."""
         return np.asarray(self.topology.border_vertices[self.F].any(axis=1))
 
+    @cached_property
+    def slits(self) -> "Slits":
+        """Edges where sheets touch, which no stroke crosses; see `slits`."""
+        from dmpcli.surfaces.slits import Slits
+
+        return Slits(self.V, self.topology)
+
     @property
     def components(self) -> Integers:
         """Component of each face, shape (m,)."""
@@ -149,10 +188,9 @@ class Mesh:
     def outward(self) -> Floats:
         """By component: 1 if closed and wound with normals outwards, -1 if inwards, 0 if open."""
         count = int(self.components.max(initial=-1)) + 1
-        gaps = np.bincount(self.components, (self.topology.uses != 2).any(axis=1), count)
         a, b, c = np.moveaxis(self.corners - self._middle, 1, 0)
         volume = np.bincount(self.components, dot(a, cross(b, c))[:, 0], count)
-        return np.where(gaps > 0, 0.0, np.sign(volume))
+        return np.where(self.topology.closed(self.V), np.sign(volume), 0.0)
 
     @cached_property
     def edge_length(self) -> float:
@@ -160,16 +198,33 @@ class Mesh:
         return float(length(np.roll(self.corners, -1, axis=1) - self.corners).mean())
 
     @cached_property
+    def _heights(self) -> Floats:
+        from dmpcli.surfaces.chordal import heights
+
+        return heights(self.V, self.F, self.topology)
+
+    @property
     def chordal_error(self) -> float:
         """Estimated largest distance between the mesh and its smooth surface, mm; see `chordal`."""
-        from dmpcli.surfaces.chordal import chordal_error
-
-        return chordal_error(self.V, self.F).largest
+        return float(self._heights.max())
 
     @cached_property
-    def reach(self) -> float:
-        """Largest distance between the mesh and the smooth course of a stroke over it, mm."""
-        return max(LEAST_REACH, 5.0 * self.chordal_error, 6.0 * self.noise)
+    def steep(self) -> Booleans:
+        """Smooth faces, shape (m,), with a corner whose normal leans off them by over `CREASE`."""
+        lean = dot(self.corner_normals, self.face_normals[:, None])[..., 0].min(axis=1)
+        return np.asarray((lean < np.cos(np.radians(CREASE))) & (self.noise == 0.0))
+
+    @cached_property
+    def reach(self) -> Floats:
+        """Largest distance of the smooth course of a stroke from the mesh at each face, (m,), mm.
+
+        By the chordal error of the faces that touch it, and by the noise about it.
+        """
+        at = np.zeros(len(self.V))
+        np.maximum.at(at, self.F.reshape(-1), np.repeat(self._heights, 3))
+        touching = at[self.F].max(axis=1)
+        reach: Floats = np.maximum(LEAST_REACH, np.maximum(5.0 * touching, 6.0 * self.noise))
+        return reach
 
     def search(self, points: Floats) -> tuple[Floats, Integers]:
         """Closest points (N, 3), mm, and their faces (N,); quickest in the order of a path."""

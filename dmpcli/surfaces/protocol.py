@@ -27,6 +27,9 @@ class Status(IntEnum):
     FOLDED = 6
     LOST = 7
     NOISY = 8
+    TORN = 9
+    MISSED = 10
+    TILTED = 11
 
     @property
     def reason(self) -> str:
@@ -37,13 +40,16 @@ class Status(IntEnum):
 _REASONS = {
     Status.DRAWN: "drawn",
     Status.COINCIDENT: "start and goal are one point",
-    Status.OTHER_COMPONENT: "start and goal are on parts of the mesh that do not touch",
+    Status.OTHER_COMPONENT: "start and goal are on parts of the mesh that are not joined",
     Status.OTHER_SIDE: "the other side of a thin wall is nearer",
     Status.NO_GEODESIC: "no geodesic from start to goal was found",
-    Status.BORDER: "the stroke leaves the mesh or crosses a hole",
+    Status.BORDER: "the stroke leaves the mesh or crosses a hole, or an edge where sheets touch",
     Status.FOLDED: "the chart folds: the stroke swings wider than the surface's curvature allows",
     Status.LOST: "the surface has a gap or a step beside the stroke",
     Status.NOISY: "the stroke crosses a crease of a noisy scan; smooth the scan first",
+    Status.TORN: "the stroke is torn at a corner or a step of the mesh; keep it off there",
+    Status.MISSED: "the stroke misses its start or goal by over 0.01 mm; move them a little",
+    Status.TILTED: "normals lean off their facets by over 25°; the mesh is too coarse there",
 }
 
 
@@ -156,6 +162,14 @@ class Charts(Protocol):
         ...
 
     def __len__(self) -> int: ...
+
+    def rows(self, rows: Integers) -> "Charts":
+        """Return the charts of some of the pairs."""
+        ...
+
+    def over(self, points: Floats) -> Booleans:
+        """Tell which points (B, T, 3) are over the charts' surface, not beside its border."""
+        ...
 
     def lift(self, coordinates: Floats) -> Lift:
         """Carry chart coordinates (B, T, 3), mm, to the surface."""

@@ -148,11 +148,16 @@ def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     tuple of Aim, Ends, array of bool (B,)
         Directions and lengths found, the last ends, and which shots hit within `HIT`.
     """
-    found, ends, miss = _corrected(mesh, aim, shot)
+    # The smooth course stands off its facets by their rounding, which does not count; a walk from
+    # facet to facet does not.
+    stands_off = np.zeros(len(aim.steps))
+    if shot is by_steps:
+        stands_off = mesh.reach[mesh.search(aim.goal)[1]]
+    found, ends, miss = _corrected(mesh, aim, shot, stands_off)
     missed = np.flatnonzero(miss > HIT)
     if len(missed):
         fan = _best_of_fan(mesh, aim.rows(missed), shot)
-        again, there, less = _corrected(mesh, fan, shot)
+        again, there, less = _corrected(mesh, fan, shot, stands_off[missed])
         better = less <= HIT
         rows = missed[better]
         found.direction[rows], found.length[rows] = again.direction[better], again.length[better]
@@ -162,7 +167,8 @@ def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     return found, ends, miss <= HIT
 
 
-def _corrected(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Floats]:
+def _corrected(mesh: Mesh, aim: Aim, shot: Shot, stands_off: Floats) -> tuple[Aim, Ends, Floats]:
+    """Correct shots; ends may be over or under the goal by less than `stands_off` (B,), mm."""
     count = len(aim.steps)
     best = aim.rows(np.arange(count))
     miss = np.full(count, np.inf)
@@ -173,9 +179,8 @@ def _corrected(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Floats]:
     for _ in range(MOST_SHOTS):
         there = shot(mesh, trial)
         gap = trial.goal - there.position
-        # Off the mesh the end is up to the rounding of its facets, which does not count.
         height = dot(gap, there.normal)
-        gap = np.where(np.abs(height) < mesh.reach, gap - height * there.normal, gap)
+        gap = np.where(np.abs(height) < stands_off[active, None], gap - height * there.normal, gap)
         error = length(gap)[:, 0]
         better = error < miss[active]
         rows = active[better]

@@ -144,7 +144,7 @@ def advance(mesh: Mesh, front: Front) -> tuple[Front, Marks]:
     sharp = ~other & (turn < _SHARP)
     # A walk that comes back from beyond a hole must land where it was heading.
     allowed = np.where(was_off, LANDING * front.away, _JUMP * h[:, 0])
-    jump = gap > np.maximum(allowed, mesh.reach)
+    jump = gap > np.maximum(allowed, mesh.reach[face])
     off = other | mesh.beyond_border(guess, foot, face) | (~sharp & jump)
     mark = off[:, None]
     foot = np.where(mark, guess, foot)

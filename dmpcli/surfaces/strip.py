@@ -36,6 +36,9 @@ class Samples:
     ----------
     foot, across, normal : array, shape (B, T, 3)
         On the mesh, mm; e_v and n.
+    face : array of int, shape (B, T)
+    stretch : array, shape (B, T)
+        Distance of neighbouring cross lines, by that at the centre line.
     outside : array of bool, shape (B, T)
     status : array of int, shape (B,)
     sharp : array of bool, shape (B,)
@@ -47,6 +50,8 @@ class Samples:
     foot: Floats
     across: Floats
     normal: Floats
+    face: Integers
+    stretch: Floats
     outside: Booleans
     status: Integers
     sharp: Booleans
@@ -57,6 +62,7 @@ def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
     """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together."""
     B, T = u.shape
     foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
+    face, stretch = np.empty((B, T), dtype=np.int64), np.empty((B, T))
     outside = np.empty((B, T), dtype=bool)
     status, sharp, slivers = np.empty(B, dtype=np.int64), *np.empty((2, B), dtype=bool)
     width = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
@@ -72,8 +78,8 @@ def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
             )
             foot[rows], e_v[rows], normal[rows] = part.foot, part.across, part.normal
             outside[rows], status[rows], sharp[rows] = part.outside, part.status, part.sharp
-            slivers[rows] = part.slivers
-    return Samples(foot, e_v, normal, outside, status, sharp, slivers)
+            slivers[rows], face[rows], stretch[rows] = part.slivers, part.face, part.stretch
+    return Samples(foot, e_v, normal, face, stretch, outside, status, sharp, slivers)
 
 
 def _grids(u: Floats, v: Floats) -> Integers:
@@ -107,9 +113,12 @@ def _lift_alike(
     foot = found.reshape(point.shape)
     elsewhere = mesh.components[face] != np.repeat(centre.part, u.shape[1])
     beyond = (elsewhere | mesh.beyond_border(flat, found, face)).reshape(u.shape)
-    near = nodes.normal[pair, i + (r > 0.5), j + (s > 0.5)]
+    nearest = pair, i + (r > 0.5), j + (s > 0.5)
+    near = nodes.normal[nearest]
     back = ~beyond & (dot(normal, near)[..., 0] < 0.0)
-    allowed = np.maximum(mesh.reach, stepping.LANDING * nodes.away[pair, i, j])
+    allowed = np.maximum(
+        mesh.reach[face].reshape(u.shape), stepping.LANDING * nodes.away[pair, i, j]
+    )
     far = ~beyond & (length(point - foot)[..., 0] > allowed)
     touched = corners(cells)
     status = np.select(
@@ -125,7 +134,17 @@ def _lift_alike(
     sharp = _any(nodes.sharp & touched)
     slivers, stretched = mesh.developable.slivers, mesh.developable.stretched
     better = _any(slivers[face].reshape(u.shape)) & ~_any(stretched[face].reshape(u.shape))
-    return Samples(foot, across(e_v, normal), normal, beyond | far, status, sharp, better)
+    return Samples(
+        foot,
+        across(e_v, normal),
+        normal,
+        face.reshape(u.shape),
+        nodes.stretch[nearest],
+        beyond | far,
+        status,
+        sharp,
+        better,
+    )
 
 
 def _any(marks: Booleans) -> Booleans:

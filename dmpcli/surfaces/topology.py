@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 
 
 @dataclass(frozen=True)
@@ -74,3 +74,43 @@ class Topology:
 
         parts: Integers = igl.vertex_components(self.faces)[self.faces[:, 0]]
         return parts
+
+    def closed(self, V: Floats) -> Booleans:
+        """Tell which components, shape (components,), have no border but where they touch.
+
+        A border that lies on another of the same component, run along the other way, is a cut
+        along an edge of several sheets (see `mending`): nothing is open there.
+
+        Parameters
+        ----------
+        V : array, shape (vertices, 3)
+        """
+        count = int(self.components.max(initial=-1)) + 1
+        closed = np.bincount(self.components, (self.uses > 2).any(axis=1), count) == 0
+        face, edge = np.nonzero(self.border)
+        if len(face) == 0:
+            return np.asarray(closed)
+        ends = np.stack([self.faces[face, edge], self.faces[face, (edge + 1) % 3]], axis=1)
+        place = places(V, ends)
+        part = self.components[face]
+        # Each edge leads away from its start as often as another comes back to it.
+        way = np.where(place[:, 0] < place[:, 1], 1, -1)
+        keys = np.column_stack([part, np.sort(place, axis=1)])
+        groups, of = np.unique(keys, axis=0, return_inverse=True)
+        left = np.bincount(of.reshape(-1), way, len(groups))
+        closed[groups[left != 0, 0]] = False
+        return np.asarray(closed)
+
+
+def places(V: Floats, ends: Integers) -> Integers:
+    """Number the places of vertices (k, 2): those at one point, up to rounding, have one number."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    used, number = np.unique(ends, return_inverse=True)
+    scale = float(np.abs(V[used]).max())
+    near = cKDTree(V[used]).query_pairs(1e-9 * scale, output_type="ndarray")
+    joined = coo_array((np.ones(len(near)), tuple(near.T)), shape=(len(used), len(used)))
+    _, place = connected_components(joined, directed=False)
+    return np.asarray(place[number].reshape(-1, 2), dtype=np.int64)

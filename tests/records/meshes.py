@@ -31,5 +31,5 @@ def written(V, F, kind):
 def obj(V, F):
     """OBJ text with every digit, and whatever indices are given."""
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(V, dtype=float).tolist()]
-    lines += ["f " + " ".join(str(i + 1) for i in face) for face in np.asarray(F).tolist()]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in F]
     return ("\n".join(lines) + "\n").encode()

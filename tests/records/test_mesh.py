@@ -16,7 +16,14 @@ from dmpcli.records import mesh
 from dmpcli.records.streams import Source
 from tests.records.meshes import box, grid, obj, written
 
-KINDS = {"stl": "stl", "stl_ascii": "stl", "obj": "obj", "ply": "ply", "ply_ascii": "ply"}
+KINDS = {
+    "stl": "stl",
+    "stl_ascii": "stl",
+    "obj": "obj",
+    "ply": "ply",
+    "ply_ascii": "ply",
+    "off": "off",
+}
 V, F = grid()
 
 
@@ -222,7 +229,7 @@ def test_a_closed_mesh_and_an_open_border_are_both_fine():
     assert_sound(mended(V, hole), (V, hole))
 
 
-# What is not safe to mend is refused by name.
+# Edges of three faces and more are borders of each, and each sheet keeps its own side.
 
 
 def wall():
@@ -233,6 +240,39 @@ def wall():
     fin = [[ridge[i], ridge[i + 1], n + i] for i in range(8)]
     fin += [[ridge[i + 1], n + i + 1, n + i] for i in range(8)]
     return np.concatenate([V, top]), np.concatenate([F, fin])
+
+
+@pytest.mark.parametrize("flipped", [[], [5], [130], [5, 130, 140]])
+def test_sheets_that_meet_in_an_edge_are_parted_and_oriented_each_for_itself(flipped):
+    both, faces = wall()
+    faces = np.array(faces)
+    faces[flipped] = faces[flipped, ::-1]
+    found = mended(both, faces)
+    assert_sound(found, (both, faces))
+    assert igl.facet_components(found.F)[0] == 3
+    assert found.remarks[0].startswith("8 edges of three faces or more, the first at (0, ")
+    assert len(found.remarks) == 1 + bool(flipped)
+    up = np.cross(
+        found.V[found.F[:, 1]] - found.V[found.F[:, 0]],
+        found.V[found.F[:, 2]] - found.V[found.F[:, 0]],
+    )
+    assert (up[:128, 2] > 0).all()
+
+
+def test_solids_that_share_an_edge_are_read_whole():
+    first, faces = box()
+    both = np.concatenate([first, first + [30.0, 0.0, 10.0]])
+    found = mended(both, np.concatenate([faces, faces + 8]))
+    assert_sound(found, (both, np.concatenate([faces, faces + 8])))
+    assert igl.facet_components(found.F)[0] == 2
+    assert len(found.F) == 28, "the four faces at the edge are cut in two"
+    assert found.remarks[0] == "2 duplicate vertices merged"
+    assert found.remarks[1].startswith("1 edge of three faces or more, the first at (15, 0, 5) mm")
+    of = mesh.description(Source("a.obj", obj(both, np.concatenate([faces, faces + 8]))))
+    assert (of["pieces"], of["volume"]) == (2, pytest.approx(12_000.0))
+
+
+# What is not safe to mend is refused by name.
 
 
 def moebius(n=24):
@@ -258,7 +298,6 @@ def changed(array, where, value):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (obj(*wall()), "8 edges belong to three faces or more, the first at (0, "),
         (obj(*moebius()), "is one-sided somewhere, like a Möbius strip"),
         (
             obj(changed(V, (12, 1), np.nan), F),
@@ -303,7 +342,7 @@ def test_truncated_files_are_refused(kind, part):
     content = written(V, F, kind)
     # An OBJ does not say how many lines it has: only a broken one shows.
     end = int(part * len(content)) if kind != "obj" else content.rindex(b"f ") + 4
-    if kind == "ply_ascii":
+    if kind in ("ply_ascii", "off"):
         end -= 4
     with pytest.raises(InputError) as error:
         read(content[:end], f"part.{KINDS[kind]}")
@@ -315,7 +354,11 @@ def test_truncated_files_are_refused(kind, part):
     [
         (b"solid part\nendsolid part\n", "p.stl", "holds no faces"),
         (b"hello", "p.stl", "as a binary STL of 0 facets it would have 84 bytes, but has 5"),
-        (b"hello", "p.txt", "is neither a mesh (STL, OBJ or PLY) nor a plane file"),
+        (
+            b"hello",
+            "p.txt",
+            "is neither a mesh (STL, OBJ, PLY or OFF) nor a plane, cylinder or sphere",
+        ),
         (b"ply\n", "p.ply", "cannot be read as PLY"),
         (b"\x89PNG\0\0", "p.png", "is neither a mesh"),
     ],
@@ -402,7 +445,7 @@ def test_no_file_whatever_it_holds_ends_the_process():
     rng = np.random.default_rng(3)
     V, F = grid(5)
     outcomes = {"read": 0, "refused": 0}
-    for kind in ("stl", "stl_ascii", "obj", "ply", "ply_ascii", "noise"):
+    for kind in ("stl", "stl_ascii", "obj", "ply", "ply_ascii", "off", "noise"):
         whole = written(V, F, kind) if kind != "noise" else bytes(300)
         for _ in range(250):
             content = np.frombuffer(whole, dtype=np.uint8).copy()

@@ -57,14 +57,14 @@ class Field:
         t = np.stack([c, s, gx * c + gy * s], axis=-1)
         return t / np.linalg.norm(t, axis=-1, keepdims=True)
 
-    def strip(self, xy, direction, coordinates):
+    def strip(self, xy, direction, coordinates, steps=160):
         """Points, e_v and normals (B, T, 3) of chart coordinates (B, T, 3) off given geodesics."""
         T = coordinates.shape[1]
         start = np.repeat(xy[:, None], T, axis=1)
         first = np.repeat(direction[:, None], T, axis=1)
-        at, along = self.walk(start, first, coordinates[..., 0])
+        at, along = self.walk(start, first, coordinates[..., 0], steps)
         e_v = np.cross(self.normal(at[..., 0], at[..., 1]), along)
-        end, e_v = self.walk(at, e_v, coordinates[..., 1])
+        end, e_v = self.walk(at, e_v, coordinates[..., 1], steps)
         return self.point(end[..., 0], end[..., 1]), e_v, self.normal(end[..., 0], end[..., 1])
 
     def distance(self, points):

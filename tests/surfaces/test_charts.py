@@ -233,9 +233,11 @@ def noisy(mesh, sigma):
 @pytest.mark.parametrize("sigma", [0.05, 0.1])
 def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma):
     smooth, case = cases.mesh(name, 35_000), cases.case(name, 12, 300)
-    assert smooth.noise == 0.0
+    assert not smooth.noise.any()
     mesh = noisy(smooth, sigma)  # edges of 1.5 mm: facets meet at up to 50°
-    assert mesh.noise == pytest.approx(sigma, rel=0.2)
+    rough = mesh.noise > 0.0
+    assert rough.mean() > 0.6
+    assert np.median(mesh.noise[rough]) == pytest.approx(sigma, rel=0.2)
     _, lift = cases.drawn(mesh, case)
     assert (lift.status == Status.DRAWN).all()
     assert not lift.unfolded.any()
