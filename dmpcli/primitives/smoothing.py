@@ -65,7 +65,7 @@ def evenly_sampled(stroke: Stroke) -> Stroke:
     t = stroke.t - stroke.t[0]
     steps = np.diff(t)
     step = float(np.median(steps))
-    if np.max(np.abs(steps - step)) <= _EVEN * step:
+    if is_even(t):
         # Spread rounding of the time stamps over the grid instead of leaving it in the derivatives.
         return Stroke(np.linspace(0.0, t[-1], len(t)), stroke.position, stroke.rotation)
     from scipy.interpolate import CubicSpline
@@ -73,6 +73,13 @@ def evenly_sampled(stroke: Stroke) -> Stroke:
     even = np.linspace(0.0, t[-1], round(float(t[-1]) / step) + 1)
     rotation = None if stroke.rotation is None else rotations.interpolate(t, stroke.rotation, even)
     return Stroke(even, CubicSpline(t, stroke.position)(even), rotation)
+
+
+def is_even(t: Floats) -> bool:
+    """Whether no step of times (T,) differs from the median one by more than rounding does."""
+    steps = np.diff(t)
+    step = float(np.median(steps))
+    return bool(np.max(np.abs(steps - step)) <= _EVEN * step)
 
 
 def low_pass(x: Floats, rate: float, cutoff: float | None) -> Floats:
