@@ -65,7 +65,7 @@ def timing(
     steps = max(1, round(total * rate))
     t = np.arange(steps + 1) / rate
     total = float(t[-1])
-    elapsed = _eased(t, ease_in) + total - _eased(total - t, ease_out) - t
+    elapsed = eased(t, ease_in) + total - eased(total - t, ease_out) - t
     elapsed -= elapsed[0]
     # Rounding must not turn stroke time back where the rate is nearly zero.
     stroke = np.maximum.accumulate(elapsed * (demonstrated / elapsed[-1]))
@@ -74,7 +74,7 @@ def timing(
     return Timing(t, stroke, tau * float(elapsed[-1]) / demonstrated)
 
 
-def _eased(t: Floats, ease: float) -> Floats:
+def eased(t: Floats, ease: float) -> Floats:
     """Integral over time of a rate that rises smoothly from 0 to 1 in `ease` seconds."""
     if ease < _SHORTEST_EASE:
         return np.array(t, dtype=float)
