@@ -5,17 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.options import Config, Quiet
+from dmpcli.commands import recording_options
+from dmpcli.commands.options import SURFACES, Config, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.arrays import Floats
-    from dmpcli.primitives.learning import Fit
-    from dmpcli.records.recordings import Layout
-
-
-POOR = 0.05
-"""Share of a stroke's extent beyond which an RMS deviation is worth a warning."""
+    from dmpcli.primitives.fit_result import Fit
+    from dmpcli.records import skill as skill_file
 
 
 def command(
@@ -33,6 +29,36 @@ def command(
             "-o", "--output", metavar="SKILL", help="Skill file (JSON).", show_default=False
         ),
     ],
+    surface: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help=f"What the stroke was taught on: {SURFACES}."),
+    ] = None,
+    surface_pose: SurfacePose = None,
+    surface_unit: SurfaceUnit = None,
+    normal: Annotated[
+        Point | None,
+        typer.Option(metavar="X Y Z", help="Normal of the plane it was taught on, to the tool."),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="RMS to keep. Default: 0.1, or 0.2 % of the stroke's diagonal."
+        ),
+    ] = None,
+    align: Annotated[
+        str | None,
+        typer.Option(help="Several demonstrations by path (default), by time, or none."),
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Learn the recording from here on.")
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(metavar="S", help="Learn the recording up to here.")
+    ] = None,
+    cut_pauses: Annotated[
+        bool | None,
+        typer.Option("--cut-pauses", help="Take pauses out.", show_default=False),
+    ] = None,
     model: Annotated[
         str | None, typer.Option(help="modified (eq. 9-11) or original (eq. 4-8).")
     ] = None,
@@ -41,7 +67,12 @@ def command(
         typer.Option(help="Original model: (g - x0) per axis, or the start-goal distance."),
     ] = None,
     regression: Annotated[str | None, typer.Option(help="lwr or ridge.")] = None,
-    basis: Annotated[int | None, typer.Option(help="N, number of Gaussian functions.")] = None,
+    basis: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|N", help="Number of Gaussian functions: 80 or as the tolerance asks."
+        ),
+    ] = None,
     damping: Annotated[float | None, typer.Option(help="d; k = d²/4.")] = None,
     tau: Annotated[
         float | None, typer.Option(help="Time constant in units of the stroke's duration.")
@@ -52,39 +83,42 @@ def command(
     ] = None,
     cutoff: Annotated[
         float | None,
-        typer.Option(help="Low-pass, Hz. Default: the highest that N functions can carry."),
+        typer.Option(help="Smoothing, Hz. Default: by the recording's noise."),
     ] = None,
     trim: Annotated[
         bool | None, typer.Option("--trim/--no-trim", help="Cut off idle ends (default).")
     ] = None,
     preset: Annotated[str, typer.Option(help="default, paper, or a TOML file.")] = "default",
     config: Config = None,
-    layout: Annotated[
-        str | None, typer.Option(help="Columns and units of a known recorder: ur or tum.")
-    ] = None,
-    map_: Annotated[
-        list[str] | None,
-        typer.Option("--map", help="OURS=THEIRS, as t=time or x=tool_x; may be repeated."),
-    ] = None,
-    length_unit: Annotated[str | None, typer.Option(help="mm, cm, m or in.")] = None,
-    time_unit: Annotated[str | None, typer.Option(help="s, ms, us or ns.")] = None,
-    angle_unit: Annotated[str | None, typer.Option(help="rad or deg.")] = None,
-    rotation: Annotated[
-        str | None,
-        typer.Option(help="What rx ry rz are: euler or rotvec; or quaternion: qx qy qz qw."),
-    ] = None,
+    layout: recording_options.LayoutName = None,
+    map_: recording_options.Map = None,
+    columns: recording_options.Columns = None,
+    body: recording_options.Body = None,
+    length_unit: recording_options.LengthUnit = None,
+    time_unit: recording_options.TimeUnit = None,
+    angle_unit: recording_options.AngleUnit = None,
+    rotation: recording_options.Rotation = None,
+    sample_rate: recording_options.SampleRate = None,
+    repeated_stamps: recording_options.Repeated = None,
+    decimal: recording_options.Decimal = None,
     quiet: Quiet = False,
 ) -> None:
     """Learn a skill from one or several demonstrations."""
-    from dmpcli.commands.messages import about, tell
+    from dmpcli.commands import surface_input
+    from dmpcli.commands.fit_messages import cautions, summary
+    from dmpcli.commands.messages import about, tell, warn
     from dmpcli.primitives.learning import fit
-    from dmpcli.records import recordings, skill, streams
+    from dmpcli.primitives.skill import TaughtSurface
+    from dmpcli.records import skill, streams
     from dmpcli.records.fit_settings import FitSettings
     from dmpcli.records.record import Provenance
     from dmpcli.records.settings import resolve
 
     if forcing_scale is not None and model == "modified":
         raise InputError("--forcing-scale: belongs to --model original; leave it out")
+    surface_input.check_options(surface, surface_pose, surface_unit)
+    if surface is not None and normal is not None:
+        raise InputError("--surface and --normal both say what the stroke was taught on; give one")
     settings = resolve(
         FitSettings,
         "fit",
@@ -92,7 +126,13 @@ def command(
             "model": model,
             "forcing_scale": forcing_scale,
             "regression": regression,
-            "basis": basis,
+            "basis": _number(basis),
+            "tolerance": tolerance,
+            "align": align,
+            "normal": normal,
+            "start": start,
+            "until": until,
+            "cut_pauses": cut_pauses,
             "damping": damping,
             "tau": tau,
             "alpha_1": alpha_1,
@@ -103,108 +143,75 @@ def command(
         preset,
         config,
     )
-    columns = _layout(layout, map_ or [], length_unit, time_unit, angle_unit, rotation)
+    form = recording_options.layout_of(
+        layout,
+        map_,
+        columns,
+        body=body,
+        length=length_unit,
+        time=time_unit,
+        angle=angle_unit,
+        rotation=rotation,
+        sample_rate=sample_rate,
+        repeated=repeated_stamps,
+        decimal=decimal,
+    )
     streams.check_writable(output)
     if [str(path) for path in demonstrations].count(streams.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [streams.read(path) for path in demonstrations]
-    strokes = [recordings.stroke(source, columns) for source in sources]
-    with about(", ".join(source.name for source in sources)):
-        result = fit(strokes, settings.choices())
+    strokes = [recording_options.recording(source, form, quiet) for source in sources]
+    options = settings.model_dump()
+    if form is not None:
+        options["layout"] = form.as_options()
+    inputs = [{"role": "demonstration", "sha256": s.sha256} for s in sources]
+    taught_on, taught = None, None
+    if surface is not None:
+        named = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
+        options |= named.options | {"surface_unit": named.unit}
+        inputs += named.inputs
+        taught_on, taught = named.surface, TaughtSurface(named.kind, named.facts)
+    names = [source.name for source in sources]
+    with about(", ".join(names)):
+        result = fit(strokes, settings.choices(), taught_on, taught)
+    streams.write(
+        output,
+        skill.encode(
+            result.skill,
+            _reproductions([source.sha256 for source in sources], result),
+            Provenance("fit", options, tuple(inputs)),
+        ),
+    )
+    tell(summary(streams.shown(output, output=True), names, result), quiet)
+    for line in cautions(names, result):
+        warn(line)
 
-    reproduction = [
+
+def _number(basis: str | None) -> int | str | None:
+    """Return N as a number where it is one; the settings hold its range."""
+    if basis is None or basis == "auto":
+        return basis
+    try:
+        return int(basis)
+    except ValueError:
+        raise InputError(f"--basis {basis}: must be auto, or a number of functions") from None
+
+
+def _reproductions(hashes: list[str], result: "Fit") -> "list[skill_file.Reproduction]":
+    from dmpcli.records import skill
+
+    return [
         skill.Reproduction(
-            sha256=source.sha256,
+            sha256=sha256,
             duration=prepared.stroke.duration,
             rms=r.rms,
             largest=r.largest,
             end=r.end,
             smoothing=prepared.removed,
+            wave=r.wave,
+            angle=r.angle,
+            noise=0.0 if prepared.seen is None else prepared.seen.sigma,
+            cutoff=prepared.cutoff,
         )
-        for source, prepared, r in zip(sources, result.prepared, result.reproductions, strict=True)
+        for sha256, prepared, r in zip(hashes, result.prepared, result.reproductions, strict=True)
     ]
-    options = settings.model_dump()
-    if columns is not None:
-        options["layout"] = columns.as_options()
-    inputs = tuple({"role": "demonstration", "sha256": s.sha256} for s in sources)
-    streams.write(
-        output, skill.encode(result.skill, reproduction, Provenance("fit", options, inputs))
-    )
-    name = streams.shown(output, output=True)
-    tell(_summary(name, [s.name for s in sources], result), quiet)
-    _caution([s.name for s in sources], result)
-
-
-def _caution(names: list[str], result: "Fit") -> None:
-    """Say it where the skill is not the stroke that was demonstrated."""
-    from dmpcli.commands.messages import warn
-    from dmpcli.surfaces.plane import extent
-
-    for name, prepared, r in zip(names, result.prepared, result.reproductions, strict=True):
-        size = extent(prepared.stroke.position)
-        if prepared.removed > POOR * size:
-            warn(f"{name}: smoothing took off much of the stroke; raise --cutoff")
-        if r.rms > POOR * size:
-            warn(f"{name}: the skill does not give this stroke back; see --basis and --alpha-1")
-
-
-def _layout(
-    known: str | None,
-    mapping: list[str],
-    length: str | None,
-    time: str | None,
-    angle: str | None,
-    rotation: str | None,
-) -> "Layout | None":
-    """Return the layout that the options describe; None where they say nothing."""
-    from dmpcli.records import recordings
-
-    given = {"length": length, "time": time, "angle": angle, "rotation": rotation}
-    if known is None and not mapping and not any(given.values()):
-        return None
-    if known is not None and known not in recordings.LAYOUTS:
-        raise InputError(
-            f"--layout {known}: no such layout; there are {', '.join(recordings.LAYOUTS)}"
-        )
-    base = recordings.LAYOUTS[known] if known else recordings.Layout()
-    return recordings.adapted(base, mapping, {k: v for k, v in given.items() if v is not None})
-
-
-def _summary(output: str, names: list[str], result: "Fit") -> str:
-    """Return what a person wants to know of a fit, a line per demonstration."""
-    skill = result.skill
-    kind = "closed" if skill.closed else f"start to goal {skill.frame.length:.3f} mm"
-    lines = [f"{output}: {skill.model} DMP, N = {len(skill.basis)}, {skill.duration:.3f} s, {kind}"]
-    exempt = [
-        name
-        for name, without in zip(("x", "y", "z", "rx", "ry", "rz"), skill.exempt, strict=True)
-        if without and skill.forcing_scale == "axis"
-    ]
-    if exempt:
-        lines.append(
-            f"  g - x0 is nearly zero in {', '.join(exempt)}: fitted with factor 1 instead"
-        )
-    for name, prepared, r in zip(names, result.prepared, result.reproductions, strict=True):
-        before, after = prepared.trimmed
-        lines.append(
-            f"  {name}: reproduction RMS {r.rms:.4f} mm, largest {r.largest:.4f}, "
-            f"end {r.end:.4f}; smoothing ({prepared.cutoff:.2f} Hz) took off "
-            f"{prepared.removed:.4f} mm RMS; trimmed {before:.2f} s and {after:.2f} s"
-        )
-        demonstrated, reproduced = (
-            _wave_height(x, r.demonstrated) for x in (r.demonstrated, r.reproduced)
-        )
-        if not skill.closed and demonstrated is not None and reproduced is not None:
-            lines.append(
-                f"  wave height {demonstrated:.3f} mm demonstrated, {reproduced:.3f} mm reproduced"
-            )
-    return "\n".join(lines)
-
-
-def _wave_height(chart: "Floats", demonstrated: "Floats") -> float | None:
-    """Return the mean wave height across the demonstrated start-goal line; None for a line."""
-    import numpy as np
-
-    from dmpcli.measures.wave import stroke_wave
-
-    return stroke_wave(chart, demonstrated[0], demonstrated[-1], np.array([0.0, 0.0, 1.0])).mean

@@ -5,16 +5,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.primitives.drawing import Style
+from dmpcli.primitives.contact_heights import demonstrated_scale
+from dmpcli.primitives.drawing import Style, turned_over
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
-from dmpcli.surfaces.plane import Plane
+from dmpcli.surfaces.plane import Plane, extent
 from dmpcli.surfaces.protocol import Surface
 
 # Start and goal of an open stroke this near to each other have no direction, mm.
 COINCIDENT = 1e-6
 # Cosine beyond which a start-goal line stands upright on the plane.
 UPRIGHT = 1.0 - 1e-6
+# A start-goal distance below this part of the stroke's extent is rather a gap ...
+NEARLY_CLOSED = 0.25
+# ... whose stretch by this much or more makes another stroke of it.
+MOST_NEARLY_CLOSED = 2.0
+# A closed stroke's gap counts as this part of its extent at least.
+CLOSED_GAP = 0.02
+# Of other strokes a stretch by this is told, and by this it is likely another unit.
+LONG_STRETCH = 3.0
+MOST_STRETCH = 20.0
+_SAMPLES = 400
 # Samples of one trajectory: more than two hours at 100 Hz.
 MOST_SAMPLES = 1_000_000
 
@@ -35,8 +46,16 @@ class Admission:
         The stroke is too short for the soft start and end.
     endless : array of bool
         The trajectory would have more than `MOST_SAMPLES` samples.
+    deep : array of bool
+        The stroke would dig into the named surface.
+    stretched : array of bool
+        The stroke would be stretched beyond all likeness, and that was not asked for.
     distance : array, shape (B,)
         The larger distance of start and goal from the given surface, mm; 0 without one.
+    depth : array, shape (B,)
+        How far the stroke would go into the named surface, mm.
+    stretch : array, shape (B,)
+        Start-goal distance by the demonstrated one.
     """
 
     coincident: Booleans
@@ -44,12 +63,17 @@ class Admission:
     upright: Booleans
     short: Booleans
     endless: Booleans
+    deep: Booleans
+    stretched: Booleans
     distance: Floats
+    depth: Floats
+    stretch: Floats
 
     @property
     def admitted(self) -> Booleans:
         """Pairs that nothing stands against."""
-        return ~(self.coincident | self.far | self.upright | self.short | self.endless)
+        against = self.coincident | self.far | self.upright | self.short | self.endless
+        return ~(against | self.deep | self.stretched)
 
 
 def admit(
@@ -94,7 +118,52 @@ def admit(
         upright = ~coincident & (along > UPRIGHT)
     short = 2.0 * duration < style.ease_in + style.ease_out
     endless = (duration + 0.5 * (style.ease_in + style.ease_out)) * style.rate > MOST_SAMPLES
-    return Admission(coincident, distance > tolerance, upright, short, endless, distance)
+    depth, deep = np.zeros(len(pairs)), np.zeros(len(pairs), dtype=bool)
+    if given is not None:
+        over = turned_over(skill, pairs, given)
+        for heights, rows in ((style.heights, ~over), (style.heights_over, over)):
+            if heights is not None:
+                depth[rows], deep[rows] = heights.depth, heights.deep
+    stretch, most = np.ones(len(pairs)), most_stretch(skill)
+    if skill.model == "modified":
+        stretch = length / (style.size * _gap(skill) if skill.closed else skill.goal[0])
+    stretched = (stretch >= most) | (not skill.closed and stretch <= 1.0 / most)
+    stretched &= ~coincident & (not style.allow_stretch)
+    return Admission(
+        coincident,
+        distance > tolerance,
+        upright,
+        short,
+        endless,
+        deep,
+        stretched,
+        distance,
+        depth,
+        stretch,
+    )
+
+
+def nearly_closed(skill: Skill) -> bool:
+    """Tell a stroke whose ends are so near to each other that their distance tells little."""
+    if skill.learning != "tolerance":
+        return False
+    return skill.closed or float(skill.goal[0]) < NEARLY_CLOSED * _extent(skill)
+
+
+def _extent(skill: Skill) -> float:
+    return extent(demonstrated_scale(skill, np.linspace(0.0, skill.duration, _SAMPLES))[:, :3])
+
+
+def _gap(skill: Skill) -> float:
+    """Distance of a closed stroke's ends that start and goal are held against, mm."""
+    return max(float(np.linalg.norm(skill.goal[:3])), CLOSED_GAP * _extent(skill))
+
+
+def most_stretch(skill: Skill) -> float:
+    """Stretch from which on a pair is refused unless it is asked for."""
+    if skill.learning != "tolerance":
+        return np.inf
+    return MOST_NEARLY_CLOSED if nearly_closed(skill) else MOST_STRETCH
 
 
 def snapped(pairs: Pairs, given: Surface) -> Pairs:

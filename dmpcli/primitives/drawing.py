@@ -7,6 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.primitives.generalization import (
     Amplitude,
     Orientation,
@@ -18,7 +19,11 @@ from dmpcli.primitives.generalization import (
 from dmpcli.primitives.retiming import Timing, timing
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.plane import Plane, pair_charts
-from dmpcli.surfaces.protocol import Charts, Status, Surface
+from dmpcli.surfaces.protocol import Charts, Status, Surface, towards
+
+# A surface that passes so near the taught start, mm, with its normal but for so small an angle
+# (cosine), is the one that the skill was taught on.
+_SAME_PLACE, _SAME_NORMAL = 0.05, 0.99
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,15 @@ class Style:
         See `roll_out`.
     ease_in, ease_out : float
         See `timing`, s.
+    heights, heights_over : ContactHeights or None
+        What is drawn of w over a named surface; of a skill whose side was guessed, also seen from
+        the other side.
+    size : float
+        Of closed strokes, beside the demonstrated one.
+    turn : float
+        Of closed strokes about the normal at their start, rad.
+    allow_stretch : bool
+        Whether start and goal may lie at any distance, however it distorts the stroke.
     """
 
     rate: float = 50.0
@@ -40,6 +54,11 @@ class Style:
     orientation: Orientation = "keep"
     ease_in: float = 0.0
     ease_out: float = 0.0
+    heights: ContactHeights | None = None
+    heights_over: ContactHeights | None = None
+    size: float = 1.0
+    turn: float = 0.0
+    allow_stretch: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,6 +91,12 @@ class Stroke:
     status: Status
     outside: Booleans
     unfolded: bool
+
+    def above(self, goal: Floats, height: float) -> Floats:
+        """Return the point (3,) at a height over the goal, along the last normal, mm."""
+        if self.normal is None or height == 0.0:
+            return goal
+        return np.asarray(goal + height * self.normal[-1])
 
     def until_border(self) -> "Stroke":
         """Return the part before the first sample beyond the border; at least one sample."""
@@ -188,8 +213,8 @@ def draw_blocks(
     InputError
         The skill's own numbers overflow.
     """
+    over = turned_over(skill, pairs, surface)
     for seconds in np.unique(duration):
-        rows = np.flatnonzero(duration == seconds)
         when = timing(
             float(seconds),
             style.rate,
@@ -198,16 +223,59 @@ def draw_blocks(
             style.ease_in,
             style.ease_out,
         )
-        yield _drawn(skill, rows, pairs[rows], when, surface, style)
+        for other in np.unique(over[duration == seconds]):
+            rows = np.flatnonzero((duration == seconds) & (over == other))
+            seen = skill.turned_over() if other else skill
+            heights = style.heights_over if other else style.heights
+            yield _drawn(seen, rows, pairs[rows], when, surface, style, heights)
+
+
+def turned_over(skill: Skill, pairs: Pairs, surface: Surface | None) -> Booleans:
+    """Tell at which pairs a surface is on the other side than was guessed for the skill.
+
+    Returns
+    -------
+    array of bool, shape (B,)
+        All false where the skill knows its side, or no surface is named.
+    """
+    if not skill.side_guessed or surface is None:
+        return np.zeros(len(pairs), dtype=bool)
+    return np.asarray(normals_at(surface, pairs.start) @ skill.frame.normal < 0.0)
+
+
+def seen_from(
+    skill: Skill, style: Style, pairs: Pairs, surface: Surface | None
+) -> tuple[Skill, ContactHeights | None]:
+    """Return a skill and its heights as the pairs see them: turned over where all of them do."""
+    over = turned_over(skill, pairs, surface)
+    if len(over) and over.all():
+        return skill.turned_over(), style.heights_over
+    return skill, style.heights
+
+
+def normals_at(surface: Surface, start: Floats) -> Floats:
+    """Normals at starts (B, 3) on the side that a skill without orientation is drawn on."""
+    if isinstance(surface, Plane):
+        return np.broadcast_to(surface.normal, start.shape)
+    normal = surface.closest(start).normal
+    return normal * towards(normal, None)
 
 
 def _drawn(
-    skill: Skill, rows: Integers, pairs: Pairs, when: Timing, surface: Surface | None, style: Style
+    skill: Skill,
+    rows: Integers,
+    pairs: Pairs,
+    when: Timing,
+    surface: Surface | None,
+    style: Style,
+    heights: ContactHeights | None,
 ) -> Block:
-    charts = None if skill.model == "original" else charts_of(skill, pairs, surface)
-    shared = curves(skill, when.stroke)
+    charts = None if skill.model == "original" else charts_of(skill, pairs, surface, style.turn)
+    shared = curves(skill, when.stroke, heights)
     with np.errstate(over="ignore", invalid="ignore"):
-        drawn = roll_out(skill, shared, pairs, charts, style.amplitude, style.orientation)
+        drawn = roll_out(
+            skill, shared, pairs, charts, style.amplitude, style.orientation, style.size
+        )
     lift, count = drawn.lift, len(pairs)
     if not _finite(drawn):
         raise InputError("the skill's numbers give no finite stroke; fit it again")
@@ -248,16 +316,48 @@ def _finite(drawn: Trajectories) -> bool:
     return bool((finite if lift is None else finite | (lift.status != Status.DRAWN)).all())
 
 
-def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None) -> Charts:
-    """Charts that a skill is drawn in at these pairs; see `draw`."""
+def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None, turn: float = 0.0) -> Charts:
+    """Charts that a skill is drawn in at these pairs; see `draw`.
+
+    Parameters
+    ----------
+    skill, pairs, surface
+        As in `draw_blocks`.
+    turn : float
+        Of a closed stroke's axes about the normal, rad.
+    """
     if surface is None:
-        return pair_charts(pairs.start, pairs.goal, skill.frame.normal, skill.closed)
-    closed = skill.frame.axes if skill.closed else None
+        charts = pair_charts(pairs.start, pairs.goal, skill.frame.normal, skill.closed)
+        if skill.closed and turn:
+            charts = replace(charts, axes=charts.axes @ _about_normal(turn))
+        return charts
+    closed = skill.frame.axes @ _about_normal(turn) if skill.closed else None
     if isinstance(surface, Plane):
         side: Floats | None = surface.normal
     elif pairs.start_rotation is not None:
         side = -pairs.start_rotation[..., 2]
     else:
-        R = skill.frame.rotation
-        side = None if R is None else -R[:, 2]
+        side = _taught_side(skill, surface, pairs.start)
     return surface.charts(pairs.start, pairs.goal, side, closed)
+
+
+def _taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None:
+    """Vectors to the side that a skill was taught on, at starts (B, 3) or everywhere (3,).
+
+    The way its tool pointed; but on the very surface that it was taught on, that surface's side:
+    about a cylinder, or on the other face of a part, the tool's direction at the taught start may
+    point out of the material.
+    """
+    if skill.surface is not None:
+        taught = surface.closest(skill.frame.start[None])
+        along = float(taught.normal[0] @ skill.frame.normal)
+        if taught.distance[0] < _SAME_PLACE and abs(along) > _SAME_NORMAL:
+            return np.asarray(np.sign(along) * surface.closest(start).normal)
+    R = skill.frame.rotation
+    return None if R is None else -R[:, 2]
+
+
+def _about_normal(turn: float) -> Floats:
+    """Rotation about a chart's third axis; exactly none for no turn."""
+    c, s = (1.0, 0.0) if turn == 0.0 else (np.cos(turn), np.sin(turn))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

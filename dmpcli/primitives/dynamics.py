@@ -21,6 +21,8 @@ from dmpcli.arrays import Floats
 # Six nodes a step: with steps of a third of the narrowest basis function the quadrature error is
 # below the rounding error of a stroke of a metre.
 NODES = 6
+# Longest step by the time in which the spring's faster mode falls to 1/e: six nodes leave 1e-11.
+_FALLEN = 2.5
 # Steps that differ by less than this are equal but for the rounding of the time stamps.
 _EVEN = 1e-12
 
@@ -101,6 +103,18 @@ def homogeneous(spring: Spring, t: Floats) -> tuple[Floats, Floats, Floats]:
     E = transition(spring, t)
     a, c = E[..., 0, 0], E[..., 0, 1]
     return a, 1.0 - a, c
+
+
+def longest_step(spring: Spring, duration: float, count: int) -> float:
+    """Step that the quadrature of a forcing term of N functions can take, s.
+
+    A third of the distance between two centres resolves the narrowest function; with few functions
+    the spring is the faster of the two.
+    """
+    half = spring.d / 2.0
+    fastest = half + np.sqrt(np.maximum(half**2 - spring.k, 0.0))
+    fastest = np.maximum(fastest, np.sqrt(spring.k))
+    return min(duration / max(1, count - 1) / 3.0, _FALLEN * spring.tau / float(fastest.max()))
 
 
 def forced(

@@ -1,211 +1,318 @@
-"""Learning a skill from demonstrations: charts, regression, alpha_f."""
+"""Learning a skill that keeps the stroke: from any recording, within a tolerance."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.primitives.agreement import pooled_mean
+from dmpcli.primitives.alignment import Alignment, align
+from dmpcli.primitives.basis_search import (
+    ANGLE,
+    Problem,
+    Quality,
+    Tolerance,
+    Weights,
+    judged,
+    nearest,
+    search,
+)
+from dmpcli.primitives.choices import TOLERANCE, TOLERANCE_SHARE, Choices
+from dmpcli.primitives.curve import Curve, dense_count
+from dmpcli.primitives.demonstrations import Demonstration
 from dmpcli.primitives.dynamics import Spring, critical
-from dmpcli.primitives.phase import even_in_time, phase
-from dmpcli.primitives.preparation import Choices, Prepared, check_alike, prepare
-from dmpcli.primitives.regression import METHODS, target_forcing
-from dmpcli.primitives.skill import Model, Response, Skill
+from dmpcli.primitives.fit_result import Fit, Reproduction
+from dmpcli.primitives.paper_learning import fit_as_paper
+from dmpcli.primitives.preparation import Prepared
+from dmpcli.primitives.preprocessing import Preprocessed, preprocess
+from dmpcli.primitives.skill import Reached, Skill, Spread, TaughtSurface
 from dmpcli.primitives.smoothing import Signal, Stroke
+from dmpcli.primitives.taught_strokes import TaughtStroke, mean_frame, taught_strokes
+from dmpcli.surfaces import plane
+from dmpcli.surfaces.protocol import Surface
 
-# An axis whose |g - x0| is below this part of the stroke's extent cannot carry the factor of (7).
-NEARLY_ZERO = 1e-3
-# A forced response below this part of the extent does not tell alpha_f.
-_NEGLIGIBLE = 1e-9
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """A demonstration beside what the skill makes of it.
-
-    Attributes
-    ----------
-    demonstrated, reproduced : array, shape (T, 3)
-        Chart coordinates u, v, w, mm.
-    rms, largest, end : float
-        Deviation at equal times, and at the last sample, mm.
-    """
-
-    demonstrated: Floats
-    reproduced: Floats
-    rms: float
-    largest: float
-    end: float
+# Samples at which the scatter of several demonstrations is kept.
+_SPREAD = 101
+# Samples of a reproduction that are kept beside those of one of several demonstrations.
+_MOST_SHOWN = 8001
+# The nearest distance of noisy samples to the true curve: by two of its three components.
+_ACROSS = 2.0
+# Standard errors of that estimate that count as noise, and standard deviations of one sample.
+_DOUBT, _OUTLYING = 3.0, 4.5
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A skill, and how well it gives back each demonstration."""
-
-    skill: Skill
-    prepared: list[Prepared]
-    reproductions: list[Reproduction]
-
-
-def fit(strokes: Sequence[Stroke], choices: Choices) -> Fit:
+def fit(
+    strokes: Sequence[Stroke],
+    choices: Choices,
+    surface: Surface | None = None,
+    taught: TaughtSurface | None = None,
+) -> Fit:
     """Learn one skill from one or several demonstrations.
-
-    Each demonstration is taken in its own chart, its time as t/T_i, its length along u scaled to
-    the mean; all are stacked in one regression (7)-(8).
 
     Parameters
     ----------
     strokes : sequence of Stroke
-        At least one; all open or all closed, all with orientation or all without.
+        At least one; all with orientation or all without.
     choices : Choices
+    surface : Surface, optional
+        What they were taught on, in the base frame; without it a plane is looked for.
+    taught : TaughtSurface, optional
+        What the skill keeps of it.
 
     Returns
     -------
     Fit
-        The task frame, and with it R(0), is the first demonstration's.
+        Its frame is the mean of the demonstrations', whatever their order.
 
     Raises
     ------
     InputError
         A stroke does not move, or the strokes do not match.
+    RefusedError
+        A recording does not lie on the surface.
     """
-    prepared = [prepare(stroke, choices) for stroke in strokes]
-    check_alike(prepared)
-    duration = float(np.mean([p.stroke.duration for p in prepared]))
-    first = prepared[0]
-    tau = choices.tau * duration
-    d = np.full(6, choices.damping)
-    spring = Spring(critical(d), d, tau)
-    basis = even_in_time(choices.basis, duration, tau, choices.alpha_1, choices.widths)
-
-    length = float(np.mean([p.frame.length for p in prepared]))
-    stretch = [_stretch(p, length, choices.model) for p in prepared]
-    signals = [
-        _rescaled(p.signal, r, p.stroke.duration / duration)
-        for p, r in zip(prepared, stretch, strict=True)
+    if choices.as_paper:
+        _check_paper(choices, surface)
+        return fit_as_paper(strokes, choices)
+    seen = [
+        preprocess(
+            stroke,
+            cutoff=choices.cutoff,
+            trim=choices.trim,
+            start=choices.start,
+            until=choices.until,
+            cut_pauses=choices.cut_pauses,
+        )
+        for stroke in strokes
     ]
-    start = np.mean([g.x[0] for g in signals], axis=0)
-    goal = np.mean([g.x[-1] for g in signals], axis=0)
-    velocity = tau * np.mean([g.velocity[0] for g in signals], axis=0)
-    factor, exempt = _factor(signals[0], choices)
-
-    times = [np.linspace(0.0, duration, len(g.x)) for g in signals]
-    s = phase(np.concatenate(times), tau, choices.alpha_1)
-    forcing = np.concatenate(
-        [target_forcing(spring, g.x[-1], g.x, g.velocity, g.acceleration) for g in signals]
+    _check_alike(seen)
+    found, planes, closed = taught_strokes(seen, choices, surface)
+    alignment, curves = _aligned(found, choices, closed)
+    mean = curves[0] if len(curves) == 1 else _mean(curves)
+    problem = _problem(mean, choices, closed)
+    lost = [lost_of(p) for p in seen]
+    tolerance = _tolerance(mean, seen, choices)
+    method = choices.regression
+    learned = search(problem, method, tolerance, choices.basis, choices.passes)
+    quality = with_lost(learned.quality, lost)
+    within = bool(quality.excess(tolerance) <= 1.0)
+    alternative = None
+    if not within and method == "lwr" and choices.basis is None:
+        ridge = search(problem, "ridge", tolerance)
+        alternative = (len(ridge.basis), with_lost(ridge.quality, lost).rms)
+    noise = max(p.sigma for p in seen)
+    skill = _skill(
+        learned,
+        problem,
+        choices,
+        found,
+        Reached(tolerance.length, quality.rms, quality.largest, noise, within),
+        taught,
+        guessed=planes is not None and planes.guessed,
+        spread=None if alignment is None else _spread(alignment),
     )
-    regress = METHODS[choices.regression]
-    if choices.model == "modified":
-        weights = regress(basis, s, s, forcing)
+    if len(found) == 1:
+        reproductions = [_reproduction(learned.demonstrated, learned.reproduced, quality)]
     else:
-        own = np.concatenate(
-            [np.broadcast_to(_factor(g, choices, exempt)[0], g.x.shape) for g in signals]
-        )
-        weights = np.concatenate(
-            [regress(basis, s, s * own[:, i], forcing[:, i : i + 1]) for i in range(6)]
-        )
+        reproductions = [
+            _own_reproduction(skill, curve, loss) for curve, loss in zip(curves, lost, strict=True)
+        ]
+    prepared = [_prepared(d, closed) for d in found]
+    return Fit(skill, prepared, reproductions, planes, alignment, alternative)
 
-    original = choices.model == "original"
-    skill = Skill(
-        model=choices.model,
-        forcing_scale=choices.forcing_scale if original else None,
+
+def _check_paper(choices: Choices, surface: Surface | None) -> None:
+    """Refuse what the paper's learning would pass over."""
+    given = {
+        "--surface": surface is not None,
+        "--normal": choices.normal is not None,
+        "--tolerance": choices.tolerance is not None,
+        "--from": choices.start is not None,
+        "--until": choices.until is not None,
+        "--cut-pauses": choices.cut_pauses,
+        "passes": choices.passes is not None,
+        "--align": choices.align != "path",
+    }
+    for name, asked in given.items():
+        if asked:
+            raise InputError(
+                f"{name}: the original model and the preset paper learn as the paper has it, which "
+                "knows none; leave it out, or take the modified model with the default preset"
+            )
+
+
+def _check_alike(seen: Sequence[Preprocessed]) -> None:
+    for i, other in enumerate(seen[1:], start=2):
+        if (other.rotation is None) != (seen[0].rotation is None):
+            raise InputError(
+                f"demonstration {i} and the first: only one has an orientation; fit them apart"
+            )
+
+
+def _problem(curve: Curve, choices: Choices, closed: bool) -> Problem:
+    d = np.full(6, choices.damping)
+    spring = Spring(critical(d), d, choices.tau * curve.duration)
+    return Problem(curve, spring, choices.alpha_1, choices.widths, closed)
+
+
+def _aligned(
+    found: Sequence[TaughtStroke], choices: Choices, closed: bool
+) -> tuple[Alignment | None, list[Curve]]:
+    """Curves over a common time, u scaled to the mean start-goal distance."""
+    if len(found) == 1:
+        return None, [found[0].curve]
+    mean = float(np.mean([d.length for d in found]))
+    tracks = []
+    for d in found:
+        x = d.curve.even(_samples_of(d.curve))
+        if not closed:
+            x[:, 0] *= mean / d.length
+        angles = None if d.seen.rotation is None else x[:, 3:]
+        tracks.append(Demonstration(d.seen.duration, x[:, :3], d.seen.smoothed_noise, angles))
+    alignment = align(tracks, choices.align)
+    intervals = max(d.curve.intervals for d in found)
+    curves = []
+    for i, x in enumerate(alignment.x):
+        columns = np.zeros((len(x), 6))
+        columns[:, :3] = x
+        if alignment.angles is not None:
+            columns[:, 3:] = alignment.angles[i]
+        curves.append(Curve.through(columns, alignment.duration, intervals))
+    return alignment, curves
+
+
+def _mean(curves: Sequence[Curve]) -> Curve:
+    samples = _samples_of(curves[0])
+    x = pooled_mean(np.array([c.even(samples) for c in curves]))
+    return Curve.through(x, curves[0].duration, curves[0].intervals)
+
+
+def _tolerance(curve: Curve, seen: Sequence[Preprocessed], choices: Choices) -> Tolerance:
+    """Tolerance of a skill: what is asked for, but not below twice the noise after smoothing."""
+    size = plane.extent(curve.even(_samples_of(curve))[:, :3])
+    length = choices.tolerance or min(TOLERANCE, TOLERANCE_SHARE * size)
+    noise = max(p.smoothed_noise for p in seen)
+    angular = max(p.smoothed_angular_noise for p in seen)
+    return Tolerance(max(length, 2.0 * noise), max(ANGLE, 2.0 * angular))
+
+
+def _samples_of(curve: Curve) -> int:
+    return len(curve.spline.c)
+
+
+def lost_of(seen: Preprocessed) -> tuple[float, float]:
+    """RMS and largest of what smoothing took off a recording beyond its noise, mm."""
+    count = dense_count(len(seen.raw.position))
+    smooth = seen.position(np.linspace(0.0, seen.duration, count))
+    return _beyond_noise(nearest(seen.raw.position, smooth), seen.sigma)
+
+
+def _beyond_noise(distance: Floats, noise: float) -> tuple[float, float]:
+    explained = _ACROSS * noise**2 * (1.0 + _DOUBT / np.sqrt(len(distance)))
+    rms = float(np.sqrt(max(0.0, float(np.mean(distance**2)) - explained)))
+    return rms, max(0.0, float(distance.max()) - _OUTLYING * noise)
+
+
+def with_lost(quality: Quality, lost: Sequence[tuple[float, float]]) -> Quality:
+    """Add what smoothing lost to the skill's own error."""
+    rms = max((loss[0] for loss in lost), default=0.0)
+    largest = max((loss[1] for loss in lost), default=0.0)
+    return Quality(
+        float(np.hypot(quality.rms, rms)),
+        max(quality.largest, largest),
+        quality.end,
+        quality.wave,
+        quality.angle,
+    )
+
+
+def _skill(
+    learned: Weights,
+    problem: Problem,
+    choices: Choices,
+    found: Sequence[TaughtStroke],
+    reached: Reached,
+    taught: TaughtSurface | None,
+    guessed: bool,
+    spread: Spread | None,
+) -> Skill:
+    curve, spring = problem.curve, problem.spring
+    x = curve.even(_samples_of(curve))
+    return Skill(
+        model="modified",
+        forcing_scale=None,
         spring=spring,
         alpha_1=choices.alpha_1,
-        basis=basis,
-        weights=weights,
-        forcing_factor=factor,
-        exempt=exempt,
-        alpha_f=np.ones(6),
+        basis=learned.basis,
+        weights=learned.weights,
+        forcing_factor=np.ones(6),
+        exempt=np.zeros(6, dtype=bool),
+        alpha_f=learned.alpha_f,
         alpha_e=spring.k / spring.d,
-        start=start,
-        goal=goal,
-        initial_velocity=velocity,
-        duration=duration,
-        closed=first.closed,
-        frame=first.frame,
-    )
-    responses = [skill.response(t) for t in times]
-    if not original:
-        skill = replace(skill, alpha_f=_alpha_f(skill, responses, signals))
-    reproductions = [
-        _reproduce(skill, r, p, scale)
-        for r, p, scale in zip(responses, prepared, stretch, strict=True)
-    ]
-    return Fit(skill, prepared, reproductions)
-
-
-def _stretch(p: Prepared, length: float, model: Model) -> Floats:
-    """Factors that bring a demonstration's coordinates to the mean length along u."""
-    scale = np.ones(6)
-    if model == "modified" and not p.closed:
-        scale[0] = length / p.frame.length
-    return scale
-
-
-def _rescaled(signal: Signal, scale: Floats, time: float) -> Signal:
-    return Signal(
-        signal.x * scale, signal.velocity * scale * time, signal.acceleration * scale * time**2
+        start=x[0],
+        goal=x[-1],
+        initial_velocity=learned.initial_velocity,
+        duration=curve.duration,
+        closed=problem.closed,
+        frame=mean_frame(found, problem.closed),
+        learning="tolerance",
+        passes=learned.passes,
+        surface=taught,
+        heights=(float(x[:, 2].min()), float(x[:, 2].max())),
+        side_guessed=guessed,
+        reached=reached,
+        spread=spread,
     )
 
 
-def _factor(
-    signal: Signal, choices: Choices, exempt: Booleans | None = None
-) -> tuple[Floats, Booleans]:
-    """Factor beside s in eq. (7) per axis, and which axes go without it."""
-    if choices.model == "modified":
-        return np.ones(6), np.zeros(6, dtype=bool)
-    difference = signal.x[-1] - signal.x[0]
-    ranges = np.ptp(signal.x, axis=0)
-    if exempt is None:
-        size = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
-        exempt = np.abs(difference) <= NEARLY_ZERO * size
-        if choices.forcing_scale == "distance":
-            exempt[:3] = np.linalg.norm(difference[:3]) <= NEARLY_ZERO * size[0]
-            exempt[3:] = True
-    if choices.forcing_scale == "distance":
-        difference = np.full(6, np.linalg.norm(difference[:3]))
-    return np.where(exempt, 1.0, difference), exempt
+def _spread(alignment: Alignment) -> Spread:
+    """Scatter of the demonstrations at a few shares of the duration."""
+    share = np.linspace(0.0, 1.0, _SPREAD)
+    at = np.linspace(0.0, 1.0, len(alignment.spread))
+    deviation = np.zeros((_SPREAD, 6))
+    for axis, column in enumerate(alignment.spread.T):
+        deviation[:, axis] = np.interp(share, at, column)
+    return Spread(share, deviation)
 
 
-def _alpha_f(skill: Skill, responses: Sequence[Response], signals: Sequence[Signal]) -> Floats:
-    """Factor per axis that brings the forced response closest to the demonstrations.
-
-    With x = x_hom + alpha x_forced: ``alpha = <x_demo - x_hom, x_forced> / <x_forced, x_forced>``;
-    1 where x_forced is negligible.
-    """
-    across, along = np.zeros(6), np.zeros(6)
-    size = np.zeros(6)
-    for r, signal in zip(responses, signals, strict=True):
-        rest = signal.x - signal.x[0] * r.a - signal.x[-1] * r.b - skill.initial_velocity * r.c
-        across += np.sum(rest * r.forced, axis=0)
-        along += np.sum(r.forced**2, axis=0)
-        ranges = np.ptp(signal.x, axis=0)
-        extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
-        size += len(signal.x) * extents**2
-    told = along > _NEGLIGIBLE**2 * size
-    return np.where(told, across / np.where(told, along, 1.0), 1.0)
-
-
-def _reproduce(skill: Skill, r: Response, p: Prepared, stretch: Floats) -> Reproduction:
-    """Roll the skill out at a demonstration's own start, goal, length and duration."""
-    scale = 1.0 / stretch
-    if skill.model == "original":
-        choices = Choices(model="original", forcing_scale=skill.forcing_scale or "axis")
-        scale = _factor(p.signal, choices, skill.exempt)[0] / skill.forcing_factor
-    x = (
-        p.signal.x[0] * r.a
-        + p.signal.x[-1] * r.b
-        + scale * (skill.initial_velocity * r.c + skill.alpha_f * r.forced)
+def _own_reproduction(skill: Skill, curve: Curve, lost: tuple[float, float]) -> Reproduction:
+    """Roll the skill out at one of several demonstrations' own ends, in its own chart."""
+    t = np.linspace(0.0, skill.duration, min(_samples_of(curve), _MOST_SHOWN))
+    r, x = skill.response(t), curve(t)
+    reproduced: Floats = (
+        x[0] * r.a + x[-1] * r.b + skill.initial_velocity * r.c + skill.alpha_f * r.forced
     )
-    demonstrated, reproduced = p.signal.x[:, :3], x[:, :3]
-    if skill.model == "original":
-        demonstrated = (demonstrated - p.frame.start) @ p.frame.axes
-        reproduced = (reproduced - p.frame.start) @ p.frame.axes
-    error = np.linalg.norm(reproduced - demonstrated, axis=1)
+    return _reproduction(x, reproduced, with_lost(judged(x, reproduced, skill.closed), [lost]))
+
+
+def _reproduction(demonstrated: Floats, reproduced: Floats, quality: Quality) -> Reproduction:
     return Reproduction(
-        demonstrated,
-        reproduced,
-        float(np.sqrt(np.mean(error**2))),
-        float(error.max()),
-        float(error[-1]),
+        demonstrated[:, :3],
+        reproduced[:, :3],
+        quality.rms,
+        quality.largest,
+        quality.end,
+        quality.wave,
+        quality.angle,
+    )
+
+
+def _prepared(demonstration: TaughtStroke, closed: bool) -> Prepared:
+    """What reports and pictures show of a demonstration: at the recording's own sample times."""
+    seen = demonstration.seen
+    t = seen.raw.t
+    position = seen.position(t)
+    rotation = None if seen.rotation is None else seen.rotation(t)
+    curve = demonstration.curve
+    return Prepared(
+        Stroke(t, position, rotation),
+        Signal(curve(t), curve(t, 1), curve(t, 2)),
+        demonstration.frame,
+        closed,
+        float(np.sqrt(np.mean(np.sum((position - seen.raw.position) ** 2, axis=1)))),
+        seen.trimmed,
+        seen.cutoff,
+        seen.raw.position,
+        seen,
     )

@@ -1,4 +1,7 @@
-"""Preparing demonstrations: even, trimmed, smoothed, and in the coordinates that are learned."""
+"""Demonstrations as the paper's learning takes them: even, trimmed, low-passed, in a chart.
+
+`preprocessing` prepares them for learning by a tolerance.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,47 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli import rotations
+from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.primitives import smoothing
-from dmpcli.primitives.phase import WidthRule
-from dmpcli.primitives.regression import Method
-from dmpcli.primitives.skill import ForcingScale, Model, TaskFrame
+from dmpcli.primitives.choices import PAPER_BASIS, Choices
+from dmpcli.primitives.preprocessing import Preprocessed
+from dmpcli.primitives.skill import TaskFrame
 from dmpcli.primitives.smoothing import Signal, Stroke
 from dmpcli.surfaces import plane
-
-
-@dataclass(frozen=True)
-class Choices:
-    """How to learn; the presets name these.
-
-    Attributes
-    ----------
-    model, forcing_scale, regression
-        See `Skill` and `regression`.
-    basis : int
-        N.
-    damping : float
-        d; k = d²/4.
-    tau : float
-        In units of the demonstration's duration.
-    alpha_1 : float
-    widths : {'spacing', 'power'}
-    cutoff : float or None
-        Low-pass, Hz; None takes the highest frequency that the basis can carry, N / (2 T_d).
-    trim : bool
-        Whether idle ends are cut off.
-    """
-
-    model: Model = "modified"
-    forcing_scale: ForcingScale = "axis"
-    regression: Method = "lwr"
-    basis: int = 80
-    damping: float = 20.0
-    tau: float = 0.5
-    alpha_1: float = 1.0
-    widths: WidthRule = "spacing"
-    cutoff: float | None = None
-    trim: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,8 +35,12 @@ class Prepared:
         RMS of what smoothing took off the positions, mm.
     trimmed : tuple of float
         Idle time cut off before and after, s.
-    cutoff : float
-        Hz.
+    cutoff : float or None
+        Hz; None where nothing was smoothed.
+    recorded : array, shape (n, 3)
+        The samples that it was made from, before smoothing, mm.
+    seen : Preprocessed or None
+        What was found in the recording; None of the paper's learning.
     """
 
     stroke: Stroke
@@ -75,11 +49,19 @@ class Prepared:
     closed: bool
     removed: float
     trimmed: tuple[float, float]
-    cutoff: float
+    cutoff: float | None
+    recorded: Floats
+    seen: Preprocessed | None = None
 
 
 def prepare(stroke: Stroke, choices: Choices) -> Prepared:
     """Smooth and trim a demonstration, find its chart, and bring it there.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    choices : Choices
+        With N.
 
     Raises
     ------
@@ -87,15 +69,16 @@ def prepare(stroke: Stroke, choices: Choices) -> Prepared:
         The stroke does not move.
     """
     even = smoothing.evenly_sampled(stroke)
+    basis = choices.basis or PAPER_BASIS
     if plane.extent(even.position) == 0.0:
         raise InputError("the tool does not move; record a stroke")
     rate = (len(even.t) - 1) / even.duration
-    cutoff = choices.cutoff or choices.basis / (2.0 * even.duration)
+    cutoff = choices.cutoff or basis / (2.0 * even.duration)
     smooth = smoothing.low_pass(even.position, rate, cutoff)
     part = smoothing.moving_part(even.t, smooth) if choices.trim else slice(0, len(even.t))
     if choices.cutoff is None and part != slice(0, len(even.t)):
         # The stroke is shorter than the recording, so that the basis carries higher frequencies.
-        cutoff = choices.basis / (2.0 * float(np.ptp(even.t[part])))
+        cutoff = basis / (2.0 * float(np.ptp(even.t[part])))
         smooth = smoothing.low_pass(even.position, rate, cutoff)
     t, position = even.t[part] - even.t[part][0], smooth[part]
     rotation = None if even.rotation is None else even.rotation[part]
@@ -124,6 +107,7 @@ def prepare(stroke: Stroke, choices: Choices) -> Prepared:
         float(np.sqrt(np.mean(removed))),
         (float(even.t[part][0]), float(even.t[-1] - even.t[part][-1])),
         cutoff,
+        even.position[part],
     )
 
 

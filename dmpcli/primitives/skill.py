@@ -1,7 +1,8 @@
 """A skill: what `fit` learns of a stroke, and all that `generalize` needs."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.phase import Basis, phase
 
 Model = Literal["modified", "original"]
+Learning = Literal["tolerance", "paper"]
 ForcingScale = Literal["axis", "distance"]
 
 
@@ -42,6 +44,60 @@ class TaskFrame:
     def length(self) -> float:
         """Distance from start to goal, mm."""
         return float(np.linalg.norm(self.goal - self.start))
+
+
+@dataclass(frozen=True)
+class TaughtSurface:
+    """The surface that a skill was taught on.
+
+    Attributes
+    ----------
+    kind : {'plane', 'cylinder', 'sphere', 'mesh'}
+    facts : mapping
+        Of its file, as it was named: its SHA-256, unit and pose.
+    """
+
+    kind: str
+    facts: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """How well a skill gives back what it was learned from.
+
+    Attributes
+    ----------
+    tolerance : float
+        What was asked for, mm.
+    rms, largest : float
+        Distance of the recording to the reproduction beyond its noise, mm.
+    noise : float
+        Standard deviation of the recording's noise, mm.
+    within : bool
+        Whether the skill keeps the tolerance, in wave height and orientation too.
+    """
+
+    tolerance: float
+    rms: float
+    largest: float
+    noise: float
+    within: bool
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Scatter of several demonstrations about their mean.
+
+    Attributes
+    ----------
+    share : array, shape (P,)
+        Of the duration, 0 to 1.
+    deviation : array, shape (P, 6)
+        Standard deviation of each coordinate, mm and rad.
+    """
+
+    share: Floats
+    deviation: Floats
 
 
 @dataclass(frozen=True)
@@ -81,6 +137,20 @@ class Skill:
     closed : bool
         Whether the stroke ends where it began.
     frame : TaskFrame
+    learning : {'tolerance', 'paper'}
+        How it was learned.
+    passes : int
+        Of LWR.
+    surface : TaughtSurface or None
+        None for a skill in the chart of a plane.
+    heights : tuple of float
+        Least and largest w of the demonstrations, mm.
+    side_guessed : bool
+        Nothing told the side of the plane: a surface named later decides it.
+    reached : Reached or None
+        None for the paper's learning, and for skills of older files.
+    spread : Spread or None
+        None for a single demonstration.
     """
 
     model: Model
@@ -99,11 +169,41 @@ class Skill:
     duration: float
     closed: bool
     frame: TaskFrame
+    learning: Learning = "paper"
+    passes: int = 1
+    surface: TaughtSurface | None = None
+    heights: tuple[float, float] = (0.0, 0.0)
+    side_guessed: bool = False
+    reached: Reached | None = None
+    spread: Spread | None = None
 
     @property
     def oriented(self) -> bool:
         """Whether the demonstration had an orientation."""
         return self.frame.rotation is not None
+
+    def turned_over(self) -> "Skill":
+        """Return the skill of the same stroke seen from the plane's other side: -v, -w.
+
+        Raises
+        ------
+        ValueError
+            The skill has an orientation: its side is known.
+        """
+        if self.oriented:
+            raise ValueError("a skill with an orientation knows its side")
+        sign = np.array([1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+        least, largest = self.heights
+        axes = self.frame.axes * sign[:3]
+        return replace(
+            self,
+            weights=self.weights * sign[:, None],
+            start=self.start * sign,
+            goal=self.goal * sign,
+            initial_velocity=self.initial_velocity * sign,
+            heights=(-largest, -least),
+            frame=replace(self.frame, axes=axes),
+        )
 
     def forcing(self, t: Floats) -> Floats:
         """``f(s(t))`` of eq. (7), demonstration scale, without alpha_f.
@@ -130,8 +230,7 @@ class Skill:
         t : array, shape (T,)
             Non-decreasing from 0, s, on the demonstration's time scale.
         """
-        # A third of the distance between two centres resolves the narrowest basis function.
-        step = self.duration / max(1, len(self.basis) - 1) / 3.0
+        step = dynamics.longest_step(self.spring, self.duration, len(self.basis))
         a, b, c = dynamics.homogeneous(self.spring, t)
         forced = dynamics.forced(self.spring, self.forcing, t, step)
         return Response(a, b, c, forced)

@@ -130,7 +130,9 @@ def _first(error: ValidationError, section: str, origin: Mapping[str, str]) -> s
         return f"[{section}] {message}"
     first, *rest = detail["loc"]
     where = origin.get(str(first), "defaults")
-    name = str(first) + "".join(f"[{part}]" for part in rest if where != "command line")
+    # Of a choice between types pydantic also names the type that it tried.
+    places = [part for part in rest if isinstance(part, int) and where != "command line"]
+    name = str(first) + "".join(f"[{part}]" for part in places)
     if detail["type"] == "missing":
         if rest:
             return f"{where}: [{section}] {first}: has too few entries, [{rest[0]}] is missing"

@@ -4,6 +4,7 @@ Its JSON Schema is published in the package, ``json_schemas/skill.schema.json``.
 """
 
 import json
+from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -11,9 +12,10 @@ from pydantic import Field, model_validator
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.primitives import skill as skills
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.phase import Basis
-from dmpcli.primitives.skill import Skill, TaskFrame
+from dmpcli.primitives.skill import Skill, TaskFrame, TaughtSurface
 from dmpcli.records import documents
 from dmpcli.records.documents import Part
 from dmpcli.records.record import Provenance
@@ -21,7 +23,7 @@ from dmpcli.records.schemas import EULER, FRAME
 from dmpcli.records.streams import Source
 
 SCHEMA: Literal["skill"] = "skill"
-VERSION = 1
+VERSION = 2
 
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -53,6 +55,40 @@ class Reproduction(Part):
     largest: Annotated[float, Field(ge=0)]
     end: Annotated[float, Field(ge=0, description="deviation at the last sample")]
     smoothing: Annotated[float, Field(ge=0, description="RMS of what smoothing took off")]
+    wave: Annotated[
+        tuple[float, float] | None, Field(description="wave height demonstrated and reproduced")
+    ] = None
+    angle: Annotated[float, Field(ge=0, description="largest of the orientation, rad")] = 0.0
+    noise: Annotated[float, Field(ge=0, description="standard deviation of the recording's")] = 0.0
+    cutoff: Annotated[
+        float | None, Field(gt=0, description="of the smoothing, Hz; null where there was none")
+    ] = None
+
+
+class Surface(Part):
+    """The surface that the skill was taught on; its chart is the skill's."""
+
+    kind: Literal["plane", "cylinder", "sphere", "mesh"]
+    facts: Annotated[dict[str, Any], Field(description="its file's SHA-256, unit and pose")]
+
+
+class Reached(Part):
+    """How well the skill gives back what it was learned from, beyond the noise, in mm."""
+
+    tolerance: Annotated[Positive, Field(description="of RMS and wave; four times it anywhere")]
+    rms: Annotated[float, Field(ge=0)]
+    largest: Annotated[float, Field(ge=0)]
+    noise: Annotated[float, Field(ge=0)]
+    within: Annotated[bool, Field(description="false marks the skill: later commands repeat it")]
+
+
+class Spread(Part):
+    """Scatter of several demonstrations about their mean."""
+
+    share: Annotated[Weights, Field(description="of the duration")]
+    deviation: Annotated[
+        list[Six], Field(description="standard deviation of u v w, mm, and of the angles, rad")
+    ]
 
 
 class SkillFile(Part):
@@ -83,6 +119,19 @@ class SkillFile(Part):
     centres: Weights
     widths: Weights
     weights: Annotated[list[Weights], Field(min_length=6, max_length=6, description="6 x N")]
+    learning: Annotated[Literal["tolerance", "paper"], Field(description="how it was learned")] = (
+        "paper"
+    )
+    passes: Annotated[int, Field(ge=1, description="of LWR")] = 1
+    surface: Surface | None = None
+    heights: Annotated[
+        tuple[float, float], Field(description="least and largest w demonstrated, mm")
+    ] = (0.0, 0.0)
+    side_guessed: Annotated[
+        bool, Field(description="nothing told the plane's side; a surface named later does")
+    ] = False
+    reached: Reached | None = None
+    spread: Spread | None = None
     reproduction: Annotated[list[Reproduction], Field(min_length=1)]
     options: dict[str, Any]
     inputs: list[dict[str, str]]
@@ -142,6 +191,17 @@ def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenanc
         centres=skill.basis.centres.tolist(),
         widths=skill.basis.widths.tolist(),
         weights=skill.weights.tolist(),
+        learning=skill.learning,
+        passes=skill.passes,
+        surface=None
+        if skill.surface is None
+        else Surface(kind=skill.surface.kind, facts=dict(skill.surface.facts)),
+        heights=skill.heights,
+        side_guessed=skill.side_guessed,
+        reached=None if skill.reached is None else Reached(**asdict(skill.reached)),
+        spread=None
+        if skill.spread is None
+        else Spread(share=skill.spread.share.tolist(), deviation=skill.spread.deviation.tolist()),
         reproduction=reproduction,
         options=provenance.options,
         inputs=list(provenance.inputs),
@@ -188,6 +248,17 @@ def _skill(file: SkillFile) -> Skill:
             array(frame.axes),
             None if frame.rotation is None else rotations.from_euler(array(frame.rotation)),
         ),
+        learning=file.learning,
+        passes=file.passes,
+        surface=None
+        if file.surface is None
+        else TaughtSurface(file.surface.kind, file.surface.facts),
+        heights=file.heights,
+        side_guessed=file.side_guessed,
+        reached=None if file.reached is None else skills.Reached(**file.reached.model_dump()),
+        spread=None
+        if file.spread is None
+        else skills.Spread(array(file.spread.share), array(file.spread.deviation)),
     )
 
 

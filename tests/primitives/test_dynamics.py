@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from dmpcli.primitives import dynamics
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from tests.primitives.strokes import paper_stroke
 
 

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from dmpcli import rotations
 from dmpcli.measures.paper import GENERALIZATION
 from dmpcli.primitives.admission import admit, snapped
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.drawing import Style, charts_of, draw
 from dmpcli.primitives.generalization import Pairs, curves, poses
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.primitives.retiming import timing
 from dmpcli.primitives.smoothing import Stroke
 from dmpcli.surfaces.plane import Plane
@@ -255,8 +255,11 @@ def test_admission_names_what_stands_against_each_pair(skill, ring):
     verdict = admit(skill, Pairs(start, goal), np.full(4, 10.0), Style(), plate, 1.0)
     assert verdict.far.tolist() == [False, False, True, True]
     assert verdict.distance[3] == pytest.approx(4.0)
-    closed = admit(ring, Pairs(start, goal), np.full(4, 10.0), Style(), None, 1.0)
+    apart = Style(allow_stretch=True)
+    closed = admit(ring, Pairs(start, goal), np.full(4, 10.0), apart, None, 1.0)
     assert closed.admitted.all()
+    closed = admit(ring, Pairs(start, goal), np.full(4, 10.0), Style(), None, 1.0)
+    assert closed.stretched.tolist() == [True, False, True, True]
     eased = Style(ease_in=11.0, ease_out=10.0)
     assert admit(ring, Pairs(start, goal), np.full(4, 10.0), eased, None, 1.0).short.all()
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from dmpcli.measures.deviation import nearest_rms
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.drawing import Style, draw
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.primitives.smoothing import Stroke
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
@@ -30,6 +30,8 @@ def test_reproduction_stays_within_the_promised_share_of_the_diagonal(shape, reg
         reproduced += result.skill.frame.start
         error = nearest_rms(reproduced, stroke.position) / extent(stroke.position)
         assert 100 * error <= percent
+        ends = reproduced[[0, -1]] - stroke.position[[0, -1]]
+        assert np.linalg.norm(ends, axis=1).max() <= 0.05
 
 
 @pytest.mark.parametrize("shape", shapes())
