@@ -140,13 +140,16 @@ def write(
     from dmpcli.batch.run import Batch, Shard
     from dmpcli.commands.messages import about, progress
     from dmpcli.primitives.admission import snapped
-    from dmpcli.primitives.drawing import draw
+    from dmpcli.primitives.drawing import draw, seen_from
     from dmpcli.records import trajectory
     from dmpcli.records.record import Form
 
     if not table.good.any():
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
-    facts = trajectory.facts_of(task.skill) | {"rate": task.style.rate}
+    drawable = table.pairs[table.good.nonzero()[0]]
+    seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
+    facts = provenance.facts | trajectory.facts_of(seen, task.style, heights)
+    facts |= {"rate": task.style.rate}
     form = Form(wanted.float32, wanted.compression)
     job = Job(task, wanted.stop, replace(provenance, facts=facts), form, str(output))
     pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.options import Config, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import SURFACES, Config, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError, RefusedError, counted
 
 if TYPE_CHECKING:
     from dmpcli.batch.job import Task
-    from dmpcli.primitives.admission import Admission
+    from dmpcli.primitives.drawing import Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
@@ -50,7 +50,7 @@ def command(
     ] = None,
     surface: Annotated[
         Path | None,
-        typer.Option(help="What to draw on: plane.json (point and normal), or an STL, OBJ or PLY."),
+        typer.Option(metavar="FILE", help=f"What to draw on: {SURFACES}."),
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
@@ -73,6 +73,31 @@ def command(
     ease_out: Annotated[float | None, typer.Option(help="Soft end, s.")] = None,
     snap_tol: Annotated[
         float | None, typer.Option(help="How far start and goal may lie off the surface, mm (1).")
+    ] = None,
+    contact: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="How near to the surface the pen touches; drawn on it, deeper is refused (1).",
+        ),
+    ] = None,
+    offset: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Off the surface: stand-off, or negative, engraving."),
+    ] = None,
+    scale: Annotated[
+        float | None, typer.Option(metavar="F", help="Size of a closed stroke (1).")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(metavar="DEG", help="Turn of a closed stroke, degrees (0).")
+    ] = None,
+    allow_stretch: Annotated[
+        bool | None,
+        typer.Option(
+            "--allow-stretch",
+            help="Start and goal at any distance, however it distorts.",
+            show_default=False,
+        ),
     ] = None,
     on_error: Annotated[
         str | None,
@@ -117,10 +142,17 @@ def command(
 ) -> None:
     """Draw a skill at new start and goal points."""
     from dmpcli.batch.job import Task
-    from dmpcli.commands import batches
-    from dmpcli.commands.generalize_inputs import facing_tool, one_pair, reach_of, surface_at
+    from dmpcli.commands import batches, surface_input
+    from dmpcli.commands.generalize_inputs import (
+        facing_tool,
+        one_pair,
+        reach_of,
+        style_of,
+    )
+    from dmpcli.commands.generalize_messages import mark, tell_of_surface
+    from dmpcli.commands.messages import tell, warn
+    from dmpcli.records import lesson, streams
     from dmpcli.records import skill as skill_file
-    from dmpcli.records import streams
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.record import Provenance
     from dmpcli.records.settings import resolve
@@ -136,6 +168,11 @@ def command(
             "ease_in": ease_in,
             "ease_out": ease_out,
             "snap_tol": snap_tol,
+            "contact": contact,
+            "offset": offset,
+            "scale": scale,
+            "turn": turn,
+            "allow_stretch": allow_stretch,
         },
         preset,
         config,
@@ -143,22 +180,24 @@ def command(
     wanted = batches.asked(
         pairs, on_error, jobs, cluster, shard, pairs_per_part, float32, compression
     )
-    if pairs is not None and (start_orientation or goal_orientation):
-        raise InputError(
-            "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
-            "--start-orientation and --goal-orientation out"
-        )
-    if on_border not in ("fail", "clip", "skip"):
-        raise InputError(f"--on-border {on_border}: must be fail, clip or skip")
-    if surface is None and (surface_pose is not None or surface_unit is not None):
-        raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
+    _check_together(
+        pairs,
+        (start_orientation, goal_orientation),
+        on_border,
+        surface,
+        {
+            "--contact": contact,
+            "--offset": offset,
+        },
+    )
+    surface_input.check_options(surface, surface_pose, surface_unit)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import nursery
 
         nursery.begin()
     source = streams.read(skill)
-    learned, _ = skill_file.decode(source)
+    learned, file = skill_file.decode(source)
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
@@ -166,7 +205,8 @@ def command(
     found = None
     if surface is not None:
         options |= {"surface_unit": surface_unit or "mm", "on_border": on_border}
-        found = surface_at(surface, surface_pose, surface_unit, options, inputs, quiet)
+        read = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
+        found, options, inputs = read.surface, options | read.options, inputs + read.inputs
     reach = reach_of(robot_model, tool, learned.oriented, options, inputs, quiet)
     if pairs is None:
         assert start is not None
@@ -182,14 +222,47 @@ def command(
         options |= wanted.options
     _check_asked(learned, table, settings)
     given = None if found is None else facing_tool(found, learned, table, str(surface), quiet)
-    _judge(learned, table, given, settings, wanted.stop)
-    provenance = Provenance("generalize", options, tuple(inputs))
-    task = Task(learned, given, settings.style(), on_border, reach)
+    style = style_of(settings.style(), learned, given, settings.contact, settings.offset)
+    said = mark(learned, streams.shown(skill))
+    if said is not None:
+        warn(said)
+    if learned.surface is not None and learned.oriented and settings.orientation == "keep":
+        tell(
+            "the skill was taught on a surface: its tool turns as it did against that one, about "
+            "the axes of the taught start; --orientation surface turns it with this one",
+            quiet,
+        )
+    if given is not None:
+        tell_of_surface(learned, style, given, table, str(surface), quiet)
+    _judge(learned, table, given, settings, style, wanted.stop)
+    taught = lesson.of_skill(file).facts()
+    provenance = Provenance("generalize", options, tuple(inputs), taught)
+    task = Task(learned, given, style, on_border, reach)
     lasting = _durations(learned, table, settings)
     if pairs is None:
         _write_one(task, table, lasting, provenance, output, quiet)
     else:
         batches.write(task, table, lasting, provenance, output, wanted, quiet)
+
+
+def _check_together(
+    pairs: Path | None,
+    orientations: tuple[Point | None, Point | None],
+    on_border: str,
+    surface: Path | None,
+    of_surface: dict[str, Any],
+) -> None:
+    """Refuse options that say nothing without one another, or say it twice."""
+    if pairs is not None and any(orientations):
+        raise InputError(
+            "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
+            "--start-orientation and --goal-orientation out"
+        )
+    if on_border not in ("fail", "clip", "skip"):
+        raise InputError(f"--on-border {on_border}: must be fail, clip or skip")
+    alone = [name for name, value in of_surface.items() if value is not None]
+    if surface is None and alone:
+        raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
 
 
 def _check_destination(
@@ -235,10 +308,15 @@ def _check_asked(skill: "Skill", table: "PairTable", settings: "GeneralizeSettin
         raise InputError("--orientation surface: the original DMP knows no surface; leave it out")
     if skill.model == "original" and settings.amplitude == "scale":
         raise InputError("--amplitude scale: the original DMP scales by eq. (7); leave it out")
+    if not skill.closed and (settings.scale != 1.0 or settings.turn != 0.0):
+        raise InputError(
+            "--scale and --turn: the size and heading of an open stroke are those of its start and "
+            "goal; leave them out"
+        )
     if skill.closed and settings.amplitude == "scale":
         raise InputError(
             "--amplitude scale: a closed stroke has no start-goal distance to scale with; "
-            "leave it out"
+            "leave it out, or give its size with --scale"
         )
 
 
@@ -247,12 +325,14 @@ def _judge(
     table: "PairTable",
     given: "Surface | None",
     settings: "GeneralizeSettings",
+    style: "Style",
     stop: bool,
 ) -> None:
     """Write what stands against a pair into its status; with `stop` the first one ends all."""
     import numpy as np
 
     from dmpcli.commands.generalize_inputs import ENDS
+    from dmpcli.commands.generalize_messages import reason, tell_of_stretch
     from dmpcli.primitives.admission import admit
 
     rows = np.flatnonzero(table.good)
@@ -260,20 +340,19 @@ def _judge(
         skill,
         table.pairs[rows],
         _durations(skill, table, settings)[rows],
-        settings.style(),
+        style,
         given,
         settings.snap_tol,
     )
     for i in np.flatnonzero(~verdict.admitted):
         row = int(rows[i])
         place = f"{table.place(row)}, pair {table.ids[row]}: " if table.name != ENDS else ""
-        table.status[row] = place + _reason(verdict, int(i), settings.snap_tol)
-    if not stop:
-        return
+        table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill)
     bad = np.flatnonzero(~table.good)
-    if len(bad):
-        upright = bad[0] in rows[verdict.upright]
-        raise (RefusedError if upright else InputError)(f"{table.name}: {table.status[bad[0]]}")
+    if stop and len(bad):
+        refused = bad[0] in rows[verdict.upright | verdict.deep | verdict.stretched]
+        raise (RefusedError if refused else InputError)(f"{table.name}: {table.status[bad[0]]}")
+    tell_of_stretch(verdict, np.flatnonzero(verdict.admitted), skill, table.name)
 
 
 def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> Any:
@@ -281,29 +360,6 @@ def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings
 
     default = settings.duration or skill.duration
     return np.where(np.isnan(table.duration), default, table.duration)
-
-
-def _reason(verdict: "Admission", i: int, tolerance: float) -> str:
-    from dmpcli.primitives.admission import MOST_SAMPLES
-
-    if verdict.coincident[i]:
-        return "start and goal are one point, and the stroke is open; set them apart"
-    if verdict.short[i]:
-        return (
-            "--ease-in and --ease-out together are longer than twice the stroke; "
-            "shorten them, or give a longer --duration"
-        )
-    if verdict.endless[i]:
-        return f"more than {MOST_SAMPLES} samples; shorten --duration or lower --rate"
-    if verdict.far[i]:
-        return (
-            f"start or goal lies {verdict.distance[i]:.3f} mm off the surface, more than "
-            f"--snap-tol {tolerance:g}; move the point, or raise the tolerance"
-        )
-    return (
-        "the line from start to goal stands upright on the plane, so that no chart follows; "
-        "give the plane to draw on with --surface plane.json"
-    )
 
 
 def _remedy(status: str, on_surface: bool) -> str:
@@ -327,7 +383,8 @@ def _write_one(
     from dmpcli.batch.job import settle
     from dmpcli.commands.messages import about, tell, warn
     from dmpcli.primitives.admission import snapped
-    from dmpcli.primitives.drawing import draw
+    from dmpcli.primitives.contact_heights import end_heights
+    from dmpcli.primitives.drawing import draw, seen_from
     from dmpcli.records import record, streams, trajectory
     from dmpcli.records.pairs import OK
 
@@ -338,8 +395,12 @@ def _write_one(
     [(stroke, status)] = settle(task, [drawn])
     if status != OK:
         raise RefusedError(f"{status}; {_remedy(status, given is not None)}")
-    facts = trajectory.facts_of(task.skill) | trajectory.facts_of_stroke(
-        stroke, task.style.rate, pairs.start[0], pairs.goal[0]
+    seen, heights = seen_from(task.skill, task.style, pairs, given)
+    ends = end_heights(seen, heights)
+    facts = (
+        provenance.facts
+        | trajectory.facts_of(seen, task.style, heights)
+        | trajectory.facts_of_stroke(stroke, task.style.rate, pairs.start[0], pairs.goal[0])
     )
     done = trajectory.trajectory_record(table.ids, [stroke], replace(provenance, facts=facts))
     streams.write(output, record.encode(done))
@@ -355,7 +416,7 @@ def _write_one(
         warn("the stroke crosses a sharp crease, where no tool can follow the surface")
     if len(stroke.position) < len(drawn.position):
         warn(f"clipped at the border: {len(stroke.position)} of {len(drawn.position)} poses")
-    miss = np.linalg.norm(stroke.position[-1] - pairs.goal[0])
+    miss = np.linalg.norm(stroke.position[-1] - stroke.above(pairs.goal[0], ends[1]))
     tell(
         f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
         f"{counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "

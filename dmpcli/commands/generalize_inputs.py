@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
+    from dmpcli.primitives.contact_heights import ContactHeights
+    from dmpcli.primitives.drawing import Style
     from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.pairs import PairTable
@@ -49,40 +51,6 @@ def one_pair(
     )
 
 
-def surface_at(
-    path: Path,
-    pose: str | None,
-    unit: str | None,
-    options: dict[str, Any],
-    inputs: list[dict[str, str]],
-    quiet: bool,
-) -> "Surface":
-    """Read the surface, place it in the base frame, and say what is odd about it."""
-    from dmpcli.commands.messages import tell
-    from dmpcli.records import mesh as mesh_file
-    from dmpcli.records import pose as pose_file
-    from dmpcli.records import streams, surface
-    from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.plane import Plane
-
-    source = streams.read(path)
-    inputs.append({"role": "surface", "sha256": source.sha256})
-    placed = None
-    if pose is not None:
-        placed, pose_source = pose_file.parse(pose, "--surface-pose")
-        if pose_source is None:
-            options["surface_pose"] = [float(word) for word in pose.split()]
-        else:
-            inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
-    found = surface.load(source, unit, placed)
-    if isinstance(found, Plane):
-        return found
-    for remark in found.remarks:
-        tell(f"{path}: {remark}", quiet)
-    tell(f"{path}: {mesh_file.summary(found)}", quiet)
-    return Mesh(found.V, found.F)
-
-
 def facing_tool(
     surface: "Surface", skill: "Skill", table: "PairTable", name: str, quiet: bool
 ) -> "Surface":
@@ -92,7 +60,7 @@ def facing_tool(
     from dmpcli.surfaces.plane import Plane
 
     if not isinstance(surface, Plane):
-        return surface  # the charts of a mesh look for the tool's side at each start
+        return surface  # other charts look for the tool's side at each start
     facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
     if facing.normal @ surface.normal < 0:
         tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
@@ -138,3 +106,19 @@ def reach_of(
     source = streams.read(tool)
     inputs.append({"role": "tool", "sha256": source.sha256})
     return Reach(arm, tool_file.geometry(source))
+
+
+def style_of(
+    style: "Style", skill: "Skill", given: "Surface | None", contact: float | None, offset: float
+) -> "Style":
+    """Return the style with what is drawn of the skill's heights over a named surface."""
+    from dataclasses import replace
+
+    from dmpcli.primitives.contact_heights import contact_heights
+
+    if given is None or skill.model == "original" or skill.learning != "tolerance":
+        return style
+    over: ContactHeights | None = None
+    if skill.side_guessed:
+        over = contact_heights(skill.turned_over(), contact, offset)
+    return replace(style, heights=contact_heights(skill, contact, offset), heights_over=over)

@@ -1,5 +1,6 @@
 """The settings of ``generalize``, with the ranges that make sense."""
 
+import math
 from typing import Annotated
 
 from pydantic import Field
@@ -26,6 +27,14 @@ class GeneralizeSettings(Settings):
         Soft start and end, s.
     snap_tol : float
         How far start and goal may lie off the given surface, mm.
+    contact : float or None
+        How near to a named surface the pen touches, mm; see `contact_heights`.
+    offset : float
+        Shift off a named surface, mm.
+    scale, turn : float
+        Of closed strokes: size beside the demonstrated one, and angle about the normal, degrees.
+    allow_stretch : bool
+        Whether start and goal may lie at any distance, however it distorts the stroke.
     """
 
     duration: Annotated[float, Field(ge=0.001, le=86_400)] | None = None
@@ -35,7 +44,21 @@ class GeneralizeSettings(Settings):
     ease_in: NotNegative = 0.0
     ease_out: NotNegative = 0.0
     snap_tol: NotNegative = 1.0
+    contact: NotNegative | None = None
+    offset: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+    scale: Annotated[float, Field(ge=0.001, le=1000)] = 1.0
+    turn: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    allow_stretch: bool = False
 
     def style(self) -> Style:
-        """Return the settings as the mathematics takes them."""
-        return Style(self.rate, self.amplitude, self.orientation, self.ease_in, self.ease_out)
+        """Return the settings as the mathematics takes them; heights are for the skill to tell."""
+        return Style(
+            self.rate,
+            self.amplitude,
+            self.orientation,
+            self.ease_in,
+            self.ease_out,
+            size=self.scale,
+            turn=math.radians(self.turn),
+            allow_stretch=self.allow_stretch,
+        )

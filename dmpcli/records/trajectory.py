@@ -7,18 +7,34 @@ import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.primitives.drawing import Block, Stroke
+from dmpcli.primitives.contact_heights import ContactHeights, end_heights
+from dmpcli.primitives.drawing import Block, Stroke, Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
-from dmpcli.records import schemas
+from dmpcli.records import marks, schemas
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
 from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
 
+LEAST_HEIGHT = 1e-9
+"""A stroke that begins and ends nearer to the surface than this is on it, mm."""
 
-def facts_of(skill: Skill) -> dict[str, Any]:
-    """Return what `execute` and `report` need of the skill that drew a trajectory."""
-    return {
+
+def facts_of(
+    skill: Skill, style: Style | None = None, heights: ContactHeights | None = None
+) -> dict[str, Any]:
+    """Return what `execute` and `report` need of the skill that drew a trajectory.
+
+    Parameters
+    ----------
+    skill : Skill
+        As the pairs see it; see `seen_from`.
+    style : Style, optional
+        How the strokes were drawn.
+    heights : ContactHeights, optional
+        What was drawn of the skill's heights over a named surface.
+    """
+    facts: dict[str, Any] = {
         "model": skill.model,
         "forcing_scale": skill.forcing_scale,
         "closed": skill.closed,
@@ -26,6 +42,21 @@ def facts_of(skill: Skill) -> dict[str, Any]:
         "d": skill.spring.d.tolist(),
         "alpha_e": skill.alpha_e.tolist(),
     }
+    ends = end_heights(skill, heights)
+    if max(abs(ends[0]), abs(ends[1])) > LEAST_HEIGHT:
+        facts["end_heights"] = list(ends)
+    if heights is not None:
+        facts["over_surface"] = {
+            "band": heights.band,
+            "removed": heights.removed,
+            "offset": heights.offset,
+        }
+    if style is not None and skill.closed and (style.size, style.turn) != (1.0, 0.0):
+        facts |= {"size": style.size, "turn": style.turn}
+    mark = marks.of_reached(skill.reached)
+    if mark is not None:
+        facts[marks.FACT] = mark
+    return facts
 
 
 def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) -> dict[str, Any]:

@@ -7,10 +7,10 @@ from dmpcli.batch import workers
 from dmpcli.batch.job import Job, Task, settle
 from dmpcli.batch.run import Batch
 from dmpcli.errors import RefusedError
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.drawing import Style, draw
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.records import record, streams
 from dmpcli.records.pairs import OK, PairTable
 from dmpcli.records.record import Form, Provenance

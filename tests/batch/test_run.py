@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.records import manifest, record, skill, streams
 from dmpcli.records.record import Provenance
 from tests.primitives.strokes import paper_stroke

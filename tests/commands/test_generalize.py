@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli import cli
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.records import record, schemas, skill, streams
 from dmpcli.records.record import Provenance
 from tests.primitives.strokes import GOAL, START, circle, paper_stroke

@@ -101,6 +101,34 @@ def test_a_mesh_in_metres_is_read_in_metres(learned, tmp_path):
     assert np.abs(off_the_bench(read(tmp_path / "t").position())).max() < 0.02
 
 
+def test_solids_that_share_an_edge_are_drawn_on_but_not_across_it(tmp_path):
+    import trimesh
+
+    low = trimesh.creation.box((100.0, 80.0, 30.0))
+    both = np.concatenate([low.triangles, low.triangles + [100.0, 0.0, 30.0]])
+    path = tmp_path / "two.stl"
+    path.write_bytes(trimesh.Trimesh(both.reshape(-1, 3), np.arange(72).reshape(-1, 3)).export(
+        file_type="stl"
+    ))  # fmt: skip
+    learned = write_skill(tmp_path / "s.json", paper_stroke(), regression="ridge")
+    surface = ["--surface", path]
+    for start, goal in (
+        ([-45.0, -10.0, 15.0], [30.0, 10.0, 15.0]),
+        ([60.0, -10.0, 45.0], [140.0, 10.0, 45.0]),
+    ):
+        done = run(learned, "-o", tmp_path / "t", "--start", *start, "--goal", *goal, *surface)
+        assert done.exit_code == 0, done.stderr
+        assert "1 edge of three faces or more, the first at (50, 0, 15) mm" in done.stderr
+        position = read(tmp_path / "t").position()
+        assert np.abs(position[:, 2] - start[2]).max() < 1e-3
+        assert np.linalg.norm(position[[0, -1]] - [start, goal], axis=1).max() < 0.01
+    across = ["--start", 10.0, 0.0, 15.0, "--goal", 90.0, 0.0, 45.0]
+    done = run(learned, "-o", tmp_path / "u", *across, *surface)
+    assert done.exit_code == 3
+    assert "parts of the mesh that are not joined" in done.stderr
+    assert not (tmp_path / "u").exists()
+
+
 def test_a_stroke_over_the_border_is_refused_or_clipped(learned, tmp_path):
     edge = ["--start", -551.0, 180.0, -17.54, "--goal", -660.0, 180.0, -17.54]  # it ends at 185
     surface = ["--surface", BENCH]
