@@ -198,8 +198,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
     batch = stroke_file.find(request.trajectory, request.ids)
-    if batch.failed:
-        warn(many.passed_over(batch.failed))
+    _warn_of(batch, streams.shown(request.trajectory))
     coupling = session.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
@@ -207,7 +206,9 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     if request.output is not None:
         keeper = Keeper(request.output, realtime, request.quiet)
         keeper.check()
-    scene = session.scene(batch.found[0].stroke, request.presses)
+    first = batch.found[0]
+    above = first.facts.get("end_heights", (0.0, 0.0))[0]
+    scene = session.scene(first.stroke, request.presses, above)
     # What weighs on the sensor counts only where there is one.
     held = _decoded(tool_file, weighed=request.sensor is not None)
     bench = urls.connect(
@@ -252,6 +253,19 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         raise closing
     left = many.rest_of(batch, loop.drawn) if many.lifts(batch, settings) else ""
     _end(outcome, request, left)
+
+
+def _warn_of(batch: "Batch", name: str) -> None:
+    """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
+    from dmpcli.commands.messages import warn
+    from dmpcli.records import marks
+    from dmpcli.streaming import many
+
+    if batch.failed:
+        warn(many.passed_over(batch.failed))
+    mark = marks.of_facts(batch.found[0].facts)
+    if mark is not None:
+        warn(marks.text(name, mark))
 
 
 def _judged(

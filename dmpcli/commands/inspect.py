@@ -22,14 +22,16 @@ def command(
     schema: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Print the JSON Schema of skill, plane or tool files instead."
+            metavar="NAME",
+            help="Print the JSON Schema of skill, plane, cylinder, sphere or tool files instead.",
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
+    from dmpcli.commands.messages import tell
     from dmpcli.figures import inspection
-    from dmpcli.records import streams
+    from dmpcli.records import mesh, streams
 
     if schema is not None:
         streams.say(inspection.json_schema(schema))
@@ -38,6 +40,10 @@ def command(
         raise InputError("FILE is missing: name a file, or - for standard input")
     if Path(file).is_dir() and (Path(file) / streams.TABLE).is_file():
         file = str(Path(file) / streams.TABLE)
-    found = inspection.inspected(streams.read(file))
+    source = streams.read(file)
+    waiting = mesh.waiting(source)
+    if waiting is not None:
+        tell(waiting)
+    found = inspection.inspected(source)
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
     streams.say(text)

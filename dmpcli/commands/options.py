@@ -15,6 +15,8 @@ Box = tuple[float, float, float, float, float, float]
 ROBOTS = "mock:, elite://HOST, ur://HOST, ..."
 SENSORS = "mock:, netft://HOST, ...; see docs/drivers.md."
 
+SURFACES = "plane.json, cylinder.json, sphere.json, or an STL, OBJ, PLY or OFF"
+
 Robot = Annotated[
     str, typer.Option("--robot", metavar="URL", help=f"The arm: {ROBOTS}; see docs/drivers.md.")
 ]

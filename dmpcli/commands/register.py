@@ -20,7 +20,7 @@ def command(
     part: Annotated[
         Path,
         typer.Argument(
-            help="Mesh of the part (STL, OBJ, PLY) in its own axes.", show_default=False
+            help="Mesh of the part (STL, OBJ, PLY, OFF) in its own axes.", show_default=False
         ),
     ],
     touched: Annotated[
@@ -57,6 +57,9 @@ def command(
         raise InputError(f"--max-residual {max_residual:g}: must be a length above 0")
     streams.check_writable(output)
     sources = {"part": streams.read(part), "touched": streams.read(touched)}
+    waiting = mesh.waiting(sources["part"])
+    if waiting is not None:
+        tell(waiting, quiet)
     found = mesh.decode(sources["part"], unit)
     points = touched_file.read(sources["touched"])
     rough = None

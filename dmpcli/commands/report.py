@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dmpcli.commands import recording_options
+from dmpcli.commands.options import SURFACES, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from dmpcli.figures.footing import Ground
     from dmpcli.figures.many import Sight
     from dmpcli.figures.measured import Row
+    from dmpcli.records.layouts import Layout
 
 _WIDTH = 80
 _WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
@@ -33,53 +36,72 @@ def command(
     ],
     surface: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="What the strokes lie on: plane.json, or an STL, OBJ or PLY."
-        ),
+        typer.Option(metavar="FILE", help=f"What the strokes lie on: {SURFACES}."),
     ] = None,
-    surface_pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X Y Z RX RY RZ|pose.json",
-            help="Where the surface's own frame lies in the base frame, mm and rad.",
-        ),
-    ] = None,
-    surface_unit: Annotated[
-        str | None, typer.Option(help="Unit of a mesh file: mm (default), cm, m or in.")
-    ] = None,
+    surface_pose: SurfacePose = None,
+    surface_unit: SurfaceUnit = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "-o", "--output", metavar="DIR", help="Also write report.json, CSV and figures here."
         ),
     ] = None,
+    layout: recording_options.LayoutName = None,
+    map_: recording_options.Map = None,
+    columns: recording_options.Columns = None,
+    body: recording_options.Body = None,
+    length_unit: recording_options.LengthUnit = None,
+    time_unit: recording_options.TimeUnit = None,
+    angle_unit: recording_options.AngleUnit = None,
+    rotation: recording_options.Rotation = None,
+    sample_rate: recording_options.SampleRate = None,
+    repeated_stamps: recording_options.Repeated = None,
+    decimal: recording_options.Decimal = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
     ] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No messages.")] = False,
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
-    from dmpcli.commands.messages import tell
+    from dmpcli.commands import surface_input
+    from dmpcli.commands.messages import tell, warn
     from dmpcli.figures import document, many, stroke
     from dmpcli.records import streams
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
-    if surface is None and (surface_pose is not None or surface_unit is not None):
-        raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
+    surface_input.check_options(surface, surface_pose, surface_unit)
     if output is not None and output.exists() and not output.is_dir():
         raise InputError(f"{output}: is a file, -o needs the name of a folder")
+    form = recording_options.layout_of(
+        layout,
+        map_,
+        columns,
+        body=body,
+        length=length_unit,
+        time=time_unit,
+        angle=angle_unit,
+        rotation=rotation,
+        sample_rate=sample_rate,
+        repeated=repeated_stamps,
+        decimal=decimal,
+    )
     ground, said, normal = None, None, None
     if surface is not None:
         ground, said, normal = _ground(surface, surface_pose, surface_unit, quiet)
     labels = stroke.labels_of(files)
-    parts = [_part(name, label, normal, quiet) for name, label in zip(files, labels, strict=True)]
+    parts = [
+        _part(name, label, normal, form, quiet) for name, label in zip(files, labels, strict=True)
+    ]
+    parts = _seen(parts, ground)
     if ground is not None:
         parts = _placed(parts, ground, quiet)
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = many.Sight(document.reference_of(parts), ground, normal)
         parts = _measured(parts, sight, tables, quiet)
         report = document.document(parts, said)
+        for line in document.warnings(report):
+            warn(line)
         if output is not None:
             written = _write(output, report, parts, ground)
     if output is not None:
@@ -90,26 +112,33 @@ def command(
         streams.say(document.as_text(report, _width()).encode())
 
 
-def _part(name: str, label: str, normal: "Floats | None", quiet: bool) -> "Part":
-    """Read one input, whatever it is."""
+def _part(
+    name: str, label: str, normal: "Floats | None", form: "Layout | None", quiet: bool
+) -> "Part":
+    """Read one input, whatever it is; how recordings are seen, all of them together tell."""
     from dmpcli.commands.messages import about
     from dmpcli.figures.document import Part
-    from dmpcli.figures.stroke import demonstrated, states_of, strokes_of
-    from dmpcli.records import record, recordings, schemas, skill, streams
+    from dmpcli.figures.ranking import Pupil
+    from dmpcli.figures.recorded import Recorded
+    from dmpcli.figures.stroke import states_of, strokes_of
+    from dmpcli.records import lesson, record, schemas, skill, streams
 
     if name != streams.DASH and Path(name).is_dir():
         return _batch(Path(name), label, normal, quiet)
     source = streams.read(name)
     if source.content.lstrip()[:1] == b"{":
-        return Part(label, source.sha256, skill.SCHEMA, skill=skill.decode(source)[1])
+        learned, file = skill.decode(source)
+        with about(source.name):
+            pupil = Pupil(label, learned, file, lesson.of_skill(file))
+        return Part(label, source.sha256, skill.SCHEMA, pupil=pupil)
     found = record.decode(source) if record.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        recording = recordings.stroke(source)
-        kind, origin = ("recording", None) if found is None else ("demonstration", found.provenance)
-        with about(source.name):
-            return Part(
-                label, source.sha256, kind, [demonstrated(recording, label, normal, origin)]
-            )
+        recording = recording_options.recording(source, None if found else form, quiet)
+        kind = "recording" if found is None else "demonstration"
+        recorded = Recorded(recording, label, source.name, source.sha256, normal)
+        if found is not None:
+            recorded.origin = found.provenance
+        return Part(label, source.sha256, kind, recorded=recorded)
     run = found if found.schema is schemas.RUN else None
     states = None if run is None else states_of(run)
     with about(source.name):
@@ -122,13 +151,15 @@ def _batch(folder: Path, label: str, normal: "Floats | None", quiet: bool) -> "P
     from dmpcli.commands.messages import about, tell
     from dmpcli.figures.document import MOST_ROWS, Part
     from dmpcli.figures.stroke import pairs_of, strokes_of
-    from dmpcli.records import dataset, record, schemas, streams
+    from dmpcli.records import dataset, lesson, record, schemas, streams
 
     batch, odd = dataset.read(folder)
     for remark in odd:
         tell(remark, quiet)
     if len(batch) > MOST_ROWS:
-        return Part(label, batch.sha256, schemas.PAIRS.name, batch=batch)
+        with about(str(folder)):
+            drawn_by = lesson.of_facts(dataset.facts_of(batch))
+        return Part(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
     pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
     strokes = []
@@ -143,29 +174,40 @@ def _ground(
     path: Path, pose: str | None, unit: str | None, quiet: bool
 ) -> "tuple[Ground, Row, Floats | None]":
     """Read the surface and place it; also what the report says of it, and a plane's normal."""
-    from dmpcli.commands.messages import tell
+    from dmpcli.commands import surface_input
     from dmpcli.figures.footing import Ground
-    from dmpcli.records import pose as pose_file
-    from dmpcli.records import streams, surface
+    from dmpcli.records.lesson import surface_key
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.plane import Plane
 
-    source = streams.read(path)
-    said: Row = {"file": path.name, "sha256": source.sha256, "unit": unit or "mm", "pose": None}
-    placed = None
-    if pose is not None:
-        placed, pose_source = pose_file.parse(pose, "--surface-pose")
-        if pose_source is None:
-            said["pose"] = [float(word) for word in pose.split()]
-        else:
-            said["pose"] = {"sha256": pose_source.sha256}
-    found = surface.load(source, unit, placed)
-    if isinstance(found, Plane):
-        return Ground(path.name, found), said, found.normal
-    for remark in found.remarks:
-        tell(f"{path}: {remark}", quiet)
-    mesh = Mesh(found.V, found.F)
-    return Ground(path.name, mesh, mesh.V, mesh.F), said, None
+    read = surface_input.read(path, pose, unit, quiet)
+    found, key = read.surface, surface_key(read.facts)
+    if isinstance(found, Mesh):
+        return Ground(path.name, found, found.V, found.F, key), read.said, None
+    normal = found.normal if isinstance(found, Plane) else None
+    return Ground(path.name, found, key=key), read.said, normal
+
+
+def _seen(parts: "list[Part]", ground: "Ground | None") -> "list[Part]":
+    """Let recordings be seen as the skills did that learned from them."""
+    from dataclasses import replace
+
+    from dmpcli.commands.messages import about
+    from dmpcli.figures.document import lesson_for
+
+    pupils = [part.pupil for part in parts if part.pupil]
+    done = []
+    for part in parts:
+        recorded = part.recorded
+        if recorded is None:
+            done.append(part)
+            continue
+        recorded.skills = [(pupil.lesson, pupil.skill) for pupil in pupils]
+        recorded.surfaces = {} if ground is None else {ground.key: ground.surface}
+        with about(recorded.name):
+            stroke = recorded.stroke(lesson_for(parts, part.sha256))
+        done.append(replace(part, strokes=[stroke]))
+    return done
 
 
 def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
@@ -236,17 +278,19 @@ def _write(output: Path, report: "Row", parts: "list[Part]", ground: "Ground | N
     """Write each file whole; return their names."""
     from dmpcli.figures import document
     from dmpcli.figures.batch_figures import batch_figures
-    from dmpcli.figures.gallery import gallery
+    from dmpcli.figures.gallery import gallery, spreads
     from dmpcli.records import streams
 
     strokes = [stroke for part in parts for stroke in part.strokes]
     files = {
         "report.json": document.as_json(report),
         **gallery(strokes, ground),
+        **spreads([part.pupil.skill for part in parts if part.pupil]),
         **batch_figures([part.many for part in parts if part.many]),
     }
     # Figures of an earlier report that this one does not draw would be taken for its own.
-    for old in (*output.glob("fig[0-9]_*.*"), *output.glob("batch_*.*")):
+    ours = ("fig[0-9]_*.*", "batch_*.*", "spread_*.*")
+    for old in [path for name in ours for path in output.glob(name)]:
         if old.name not in files and old.suffix in (".svg", ".png"):
             old.unlink()
     batches = any(part.many for part in parts)

@@ -7,6 +7,7 @@ import typer
 
 from dmpcli.commands.messages import tell, warn
 from dmpcli.commands.options import (
+    SURFACES,
     Config,
     DrawnEnd,
     Periods,
@@ -50,7 +51,7 @@ def command(
     ] = "127.0.0.1",
     surface: Annotated[
         Path | None,
-        typer.Option(help="What the tool touches: plane.json, STL, OBJ or PLY; else a flat plate."),
+        typer.Option(metavar="FILE", help=f"What the tool touches: {SURFACES}; else a flat plate."),
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
@@ -194,23 +195,10 @@ def _on(
     """Put a surface in the place of the plate."""
     from dataclasses import replace
 
+    from dmpcli.commands import surface_input
     from dmpcli.instruments.virtual.part import facing
-    from dmpcli.records import pose as pose_file
-    from dmpcli.records import streams
-    from dmpcli.records import surface as surface_file
-    from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.plane import Plane
-    from dmpcli.surfaces.protocol import Surface
 
-    placed = None if pose is None else pose_file.parse(pose, "--surface-pose")[0]
-    found = surface_file.load(streams.read(path), unit, placed)
-    shape: Surface
-    if isinstance(found, Plane):
-        shape = found
-    else:
-        for remark in found.remarks:
-            tell(f"{path}: {remark}", quiet)
-        shape = Mesh(found.V, found.F)
+    shape = surface_input.read(path, pose, unit, quiet).surface
     return replace(setting, ground=facing(shape, setting.position, setting.rotation[:, 2]))
 
 

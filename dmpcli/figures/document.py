@@ -9,14 +9,17 @@ from typing import TextIO
 from rich.table import Table
 
 from dmpcli import __version__
-from dmpcli.figures import contact, measured, paper_tables, tables
+from dmpcli.figures import contact, measured, paper_tables, ranking, tables
 from dmpcli.figures.batch import Many
 from dmpcli.figures.measured import Row
+from dmpcli.figures.ranking import Pupil
+from dmpcli.figures.recorded import Recorded
 from dmpcli.figures.stroke import Stroke
+from dmpcli.records import marks
 from dmpcli.records.dataset import Batch
+from dmpcli.records.lesson import Lesson
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
-from dmpcli.records.skill import SkillFile
 
 NAME, VERSION = "report", 1
 UNITS = {
@@ -52,8 +55,12 @@ class Part:
     strokes : list of Stroke
     run : Record, optional
         The record itself, where it is a run.
-    skill : SkillFile, optional
-        Where it is one.
+    pupil : Pupil, optional
+        The skill, where it is one.
+    recorded : Recorded, optional
+        The recording, where it is one.
+    lesson : Lesson, optional
+        Of a batch: how its skill saw the recordings.
     states : dict, optional
         Of a batch: how many pairs ended in each status.
     batch : Batch, optional
@@ -67,10 +74,23 @@ class Part:
     schema: str
     strokes: list[Stroke] = field(default_factory=list)
     run: Record | None = None
-    skill: SkillFile | None = None
+    pupil: Pupil | None = None
+    recorded: Recorded | None = None
+    lesson: Lesson | None = None
     states: dict[str, int] | None = None
     batch: Batch | None = None
     many: Many | None = None
+
+
+def lesson_for(parts: Sequence[Part], sha256: str) -> Lesson | None:
+    """Return how a recording is seen on its own: as the first skill did that learned from it.
+
+    A skill's file tells it, else a trajectory or run that was drawn with one.
+    """
+    said = [part.pupil.lesson for part in parts if part.pupil]
+    said += [part.lesson for part in parts if part.lesson]
+    said += [s.lesson for part in parts for s in part.strokes if s.lesson is not None]
+    return next((lesson for lesson in said if sha256 in lesson.recordings), None)
 
 
 def reference_of(parts: Sequence[Part]) -> Stroke | None:
@@ -99,6 +119,10 @@ def document(parts: Sequence[Part], surface: Row | None = None) -> Row:
         "reference": reference.label if reference else None,
         "surface": surface,
         "files": [_entry(part, reference) for part in parts],
+        "skills": ranking.ranking(
+            [part.pupil for part in parts if part.pupil],
+            [part.recorded for part in parts if part.recorded],
+        ),
         "paper": paper_tables.comparisons(strokes),
     }
 
@@ -124,6 +148,21 @@ def write_waves(strokes: Sequence[Stroke], sink: TextIO) -> None:
             rows.writerow([stroke.label, stroke.role, i + 1, *(f"{x:.6f}" for x in values)])
 
 
+def warnings(report: Row) -> list[str]:
+    """What a person must know of the files: a line each."""
+    lines = []
+    for entry in report["files"]:
+        mark = entry["beyond_tolerance"] or (entry["skill"] or {}).get("beyond_tolerance")
+        if mark:
+            lines.append(marks.text(entry["file"], mark))
+        if any(row["elsewhere"] for row in entry["strokes"]):
+            lines.append(
+                f"{entry['file']}: was taught on a surface that is not at hand, so that nothing is "
+                "compared with it: name that one with --surface, or give the skill's file too"
+            )
+    return lines
+
+
 def _counted(states: Mapping[str, int]) -> str:
     """Say how many pairs were drawn, and of the others how many and one reason."""
     drawn = states.get(OK, 0)
@@ -142,6 +181,8 @@ def as_text(report: Row, width: int) -> str:
         for table in (tables.waves(rows), tables.motion(rows), tables.drag(rows)):
             parts += [table, ""] if table else []
         parts += _on_surface(report, rows)
+    said = warnings(report)
+    parts += [*said, ""] if said else []
     for entry in report["files"]:
         if entry["statistics"]:
             parts += [tables.statistics(entry["file"], entry), ""]
@@ -157,9 +198,9 @@ def as_text(report: Row, width: int) -> str:
     pressed = [(e["file"], e["contact"]) for e in report["files"] if e["contact"]]
     if pressed:
         parts += [contact.table(pressed), ""]
-    skills = [(e["file"], e["skill"]) for e in report["files"] if e["skill"]]
-    if skills:
-        parts += [tables.skills(skills), ""]
+    if report["skills"]:
+        rows = report["skills"]
+        parts += [ranking.table(rows), *ranking.notes(rows), ""]
     for comparison in report["paper"]:
         parts += [tables.paper(comparison), *comparison["notes"], ""]
     return tables.plain(parts[:-1], width)
@@ -180,11 +221,17 @@ def _entry(part: Part, reference: Stroke | None) -> Row:
         "worst": None,
         "states": part.states,
         "failures": None,
+        "beyond_tolerance": _mark(part),
         "deadlines": measured.deadlines_of(part.run) if part.run else None,
         "contact": contact.contact_of(part.run) if part.run else None,
-        "skill": measured.skill_of(part.skill) if part.skill else None,
+        "skill": measured.skill_of(part.pupil.file) if part.pupil else None,
     }
     return entry | (part.many.entry() if part.many else {})
+
+
+def _mark(part: Part) -> dict[str, float] | None:
+    """By how much the skill that drew the strokes of a file misses its tolerance."""
+    return next((stroke.mark for stroke in part.strokes if stroke.mark), None)
 
 
 def _rows(report: Row) -> list[Row]:
@@ -208,12 +255,30 @@ def _on_surface(report: Row, rows: Sequence[Row]) -> list[Table | str]:
                 f"{row['stroke']}: planned to start {lies['start_off']:.1f} mm and to end "
                 f"{lies['goal_off']:.1f} mm off this surface: is it the one it was drawn on?"
             )
-        if lies and (lies["lifted_max"] or 0.0) >= LEAST_LIFT:
-            remarks.append(
-                f"{row['stroke']}: off the surface after taking off the demonstration's own height "
-                f"over its plane, up to {lies['lifted_max']:.4f} mm."
-            )
+        if lies:
+            remarks += _contact(row, lies)
     return [*parts, *remarks, ""] if remarks else parts
+
+
+def _contact(row: Row, lies: Row) -> list[str]:
+    """Say what of a stroke touches the surface; none that knows no surface does."""
+    if row["role"].startswith("original"):
+        return []
+    said = []
+    if lies["offset"]:
+        side = "off" if lies["offset"] > 0.0 else "inside"
+        said.append(f"drawn {abs(lies['offset']):.4g} mm {side} the surface on purpose")
+    if lies["contact_share"] < 1.0:
+        said.append(f"in contact over {100.0 * lies['contact_share']:.0f} % of the path")
+    if lies["contact_lift"] > 0.0:
+        said.append(f"lifted by up to {lies['contact_lift']:.2f} mm")
+    lines = [f"{row['stroke']}: {', '.join(said)}."] if said else []
+    if not lies["contact_lift"] and (lies["lifted_max"] or 0.0) >= LEAST_LIFT:
+        lines.append(
+            f"{row['stroke']}: off the surface after taking off the demonstration's own height "
+            f"over its plane, up to {lies['lifted_max']:.4f} mm."
+        )
+    return lines
 
 
 def _remarks(report: Row, rows: Sequence[Row]) -> list[str]:
@@ -228,6 +293,11 @@ def _remarks(report: Row, rows: Sequence[Row]) -> list[str]:
             remarks.append(
                 f"{row['stroke']}: {kind}, smoothed as fit does; as recorded the height is "
                 f"{height}, smoothing took off {raw['removed_rms']:.3f} RMS."
+            )
+        if row["by_skill"]:
+            remarks.append(
+                f"{row['stroke']}: the surface that it was taught on is not at hand; its skill's "
+                "curve stands for it, and how far that strays from the recording is added."
             )
         if row["closed"]:
             remarks.append(f"{row['stroke']}: closed, so there is no line to measure waves from.")

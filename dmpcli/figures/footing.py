@@ -5,12 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.figures.stroke import Stroke
+from dmpcli.arrays import Floats, Integers
+from dmpcli.figures.stroke import Stroke, as_drawn
 from dmpcli.measures import surface as measure
 from dmpcli.measures.wave import WaveHeights
+from dmpcli.primitives.contact_heights import CONTACT
+from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.protocol import Hits, Status, Surface, towards
+
+ON = 0.05
+"""Nearer than this to a surface a stroke is on it, mm, where no height at all was flattened."""
 
 AT_ONCE = 64
 """Strokes measured together; the charts have as many in hand."""
@@ -28,12 +33,15 @@ class Ground:
         In the base frame.
     V, F : arrays, optional
         Of a mesh, for its picture.
+    key : str
+        Its file, unit and pose, as skills tell what they were taught on.
     """
 
     label: str
     surface: Surface
     V: Floats | None = None
     F: Integers | None = None
+    key: str = ""
 
     @property
     def curved(self) -> bool:
@@ -62,13 +70,20 @@ class Footing:
     length : float or None
         Of the geodesic between them, mm; None where none was found, and for closed strokes.
     uv : array, shape (n, 2), or None
-        Chart coordinates of the feet, mm; None where there is no chart, or it does not reach.
+        Chart coordinates, see `invert`, mm; of strokes that know no surface those of their feet.
+        None where there is no chart, or it does not reach.
     wave : WaveHeights or None
         Along the surface; None where there is no chart.
     tilt : array, shape (n,), or None
         Angle between tool and normal, rad.
     demonstrated : array, shape (m, 3), or None
-        The demonstration's u, v, w, its u stretched to this stroke's start-goal distance, mm.
+        The demonstration's u, v, w as drawn here: its u stretched to this stroke's start-goal
+        distance, its w 0 where it was in contact, mm.
+    band, touching, lift : float
+        Within which height over what was drawn on purpose it is in contact, mm; share of the path
+        that is; largest height of the rest, mm, 0 where there is none.
+    ends : array, shape (2, 3)
+        Normals on the tool's side where it should begin and end.
     remark : str or None
         Why there are no chart coordinates.
     """
@@ -87,7 +102,16 @@ class Footing:
     wave: WaveHeights | None
     tilt: Floats | None
     demonstrated: Floats | None
+    band: float
+    touching: float
+    lift: float
+    ends: Floats
     remark: str | None
+
+    def aims(self, heights: tuple[float, float]) -> Floats:
+        """Points so far above start and goal, shape (2, 3), mm."""
+        above = np.asarray(heights)[:, None] * self.ends
+        return np.asarray(np.stack([self.start, self.goal]) + above)
 
     @property
     def place(self) -> Floats | None:
@@ -131,9 +155,10 @@ def _footings(
     signs = towards(ends.normal[:, 0], side)
     hits = [surface.closest(stroke.position) for stroke in strokes]
     charted = [i for i, stroke in enumerate(strokes) if not stroke.closed]
-    feet = [hits[i].position for i in charted]
+    # A stroke that knows no surface may be anywhere: the closest points say where it is over.
+    at = [strokes[i].position if strokes[i].bound else hits[i].position for i in charted]
     upward = (signs * ends.normal[:, 0])[charted]
-    places = dict(zip(charted, _places(surface, ends.position[charted], feet, upward), strict=True))
+    places = dict(zip(charted, _places(surface, ends.position[charted], at, upward), strict=True))
     return [
         _footing(
             stroke,
@@ -166,15 +191,19 @@ def _footing(
         return there.position, sign * there.normal
 
     length, uv = place.length, place.uv
-    demonstrated = None if length is None else _stretched(reference, length)
+    demonstrated = None if length is None else _as_drawn(reference, stroke, length)
     off = None
     # The original model has no w: it does not know what off the surface means.
     if demonstrated is not None and uv is not None and stroke.bound:
         off = measure.height_there(uv, demonstrated)
+    height = measure.height(stroke.position, closest)
+    offset = 0.0 if stroke.over is None else stroke.over.offset
+    band = CONTACT if stroke.over is None else max(stroke.over.band, ON)
+    touching, lift = measure.contact(stroke.position, height - offset, band)
     return Footing(
         foot,
         normal,
-        measure.height(stroke.position, closest),
+        height,
         measure.distance(stroke.position, closest, 0.0 if off is None else off),
         None if off is None else float(np.abs(off).max()),
         ends.position[0],
@@ -186,16 +215,23 @@ def _footing(
         None if uv is None or length is None else measure.wave_along(uv, length),
         None if stroke.rotation is None else measure.tilt(stroke.rotation, normal),
         demonstrated,
+        band,
+        touching,
+        lift,
+        sign * ends.normal,
         place.remark,
     )
 
 
-def _stretched(reference: Stroke | None, length: float) -> Floats | None:
-    """Demonstration in its own chart, u stretched to a new start-goal distance, shape (m, 3)."""
-    if reference is None or reference.axes is None or reference.closed:
+def _as_drawn(reference: Stroke | None, stroke: Stroke, length: float) -> Floats | None:
+    """Demonstration in its chart as a stroke of this length draws it, shape (m, 3)."""
+    if reference is None:
         return None
-    place = (reference.position - reference.start) @ reference.axes
-    return np.asarray(place * [length / reference.length, 1.0, 1.0])
+    reference = reference.seen_for(stroke)
+    if reference.chart is None or reference.closed or reference.elsewhere:
+        return None
+    place = np.asarray(reference.chart * [length / reference.length, 1.0, 1.0])
+    return as_drawn(place, stroke.over)
 
 
 @dataclass(frozen=True)
@@ -210,51 +246,24 @@ class _Place:
 _CLOSED = _Place(None, None, "closed, so there is no line to measure waves from")
 
 
-def _places(surface: Surface, ends: Floats, feet: Sequence[Floats], normal: Floats) -> list[_Place]:
-    """Places of b strokes with ends (b, 2, 3), feet (n, 3) each and normals (b, 3) at the starts.
+def _places(surface: Surface, ends: Floats, at: Sequence[Floats], normal: Floats) -> list[_Place]:
+    """Places of b strokes with ends (b, 2, 3), points (n, 3) each and normals (b, 3) at the starts.
 
-    Shorter strokes are filled up with their last foot.
+    Shorter strokes are filled up with their last point.
     """
-    if not feet:
+    if not at:
         return []
     charts = surface.charts(ends[:, 0], ends[:, 1], normal)
-    most = max(len(foot) for foot in feet)
-    foot = np.stack([np.pad(f, ((0, most - len(f)), (0, 0)), mode="edge") for f in feet])
-    status = charts.status
-
-    def lift(uv: Floats) -> tuple[Floats, Floats, Floats]:
-        nonlocal status
-        lifted = charts.lift(np.concatenate([uv, np.zeros((*uv.shape[:2], 1))], axis=-1))
-        status = lifted.status
-        reached = np.isin(status, (Status.DRAWN, Status.BORDER))
-        gone: Booleans = lifted.outside | ~reached[:, None]
-        point = np.where(gone[..., None], np.nan, lifted.position)
-        return point, lifted.axes[..., 0], lifted.axes[..., 1]
-
-    guess = [
-        _guess(f, e, n, length)
-        for f, e, n, length in zip(foot, ends, normal, charts.lengths, strict=True)
-    ]
-    uv = measure.coordinates(foot, lift, np.stack(guess))
+    most = max(len(points) for points in at)
+    found = invert(charts, np.stack([np.pad(p, ((0, most - len(p)), (0, 0)), "edge") for p in at]))
     places = []
     for i, first in enumerate(charts.status):
         if first != Status.DRAWN:
             places.append(_Place(None, None, Status(first).reason))
             continue
-        length, here = float(charts.lengths[i]), uv[i, : len(feet[i])]
-        if np.isfinite(here).all():
-            places.append(_Place(length, here, None))
+        length, count = float(charts.lengths[i]), len(at[i])
+        if found.reached[i, :count].all():
+            places.append(_Place(length, found.coordinates[i, :count, :2], None))
             continue
-        last = Status.BORDER if status[i] == Status.DRAWN else Status(status[i])
-        places.append(_Place(length, None, last.reason))
+        places.append(_Place(length, None, Status(found.status[i]).reason))
     return places
-
-
-def _guess(foot: Floats, ends: Floats, normal: Floats, length: float) -> Floats:
-    """Coordinates as on a plane through both ends."""
-    way = ends[1] - ends[0]
-    chord = max(float(np.linalg.norm(way)), 1e-9)  # one point: such a pair has no chart anyway
-    aside = np.cross(normal, way)
-    offset = foot - ends[0]
-    u = offset @ way * (length / chord**2)
-    return np.stack([u, offset @ aside / max(float(np.linalg.norm(aside)), 1e-9)], axis=1)

@@ -9,10 +9,12 @@ from dmpcli.figures import drawing
 from dmpcli.figures.drawing import Curve, curve_of
 from dmpcli.figures.footing import Ground
 from dmpcli.figures.plane_curves import plane_curves
+from dmpcli.figures.spread_curves import spread_curves
 from dmpcli.figures.stroke import Stroke
 from dmpcli.figures.style import STYLES
 from dmpcli.figures.surface_view import surface_view
 from dmpcli.figures.time_curves import time_curves
+from dmpcli.primitives.skill import Skill
 
 MOST_PLACES = 4
 """More start-goal pairs than this share one figure instead of having two each."""
@@ -51,6 +53,29 @@ def gallery(strokes: Sequence[Stroke], ground: Ground | None = None) -> dict[str
         for name, figure in figures.items():
             for suffix, content in drawing.saved(figure).items():
                 files[f"{name}.{suffix}"] = content
+    return files
+
+
+def spreads(skills: Sequence[Skill]) -> dict[str, bytes]:
+    """Draw the scatter of the demonstrations of each skill that was learned from several.
+
+    Parameters
+    ----------
+    skills : sequence of Skill
+        In the order of the command line.
+
+    Returns
+    -------
+    dict of bytes
+        File names (SVG and PNG) and contents; of several skills they are numbered.
+    """
+    files = {}
+    with drawing.settings():
+        several = [skill for skill in skills if skill.spread is not None]
+        for number, skill in enumerate(several, start=1):
+            more = f"_{number}" if number > 1 else ""
+            for suffix, content in drawing.saved(spread_curves(skill)).items():
+                files[f"spread_demonstrations{more}.{suffix}"] = content
     return files
 
 

@@ -12,19 +12,22 @@ from rich.table import Table
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, counted
-from dmpcli.figures import tables
+from dmpcli.figures import skill_words, tables
 from dmpcli.figures.measured import Row
 from dmpcli.records import (
     documents,
+    layouts,
+    marks,
     mesh,
     mesh_formats,
-    plane,
+    motive,
     pose,
     publish,
     record,
     recordings,
     schemas,
     skill,
+    surface,
     tool,
 )
 from dmpcli.records import tables as records_tables
@@ -53,7 +56,7 @@ def inspected(source: Source) -> Row:
     Raises
     ------
     InputError
-        Damaged, of a newer version, or neither Parquet nor text; a skill or plane with a wrong
+        Damaged, of a newer version, or neither Parquet nor text; a skill or surface with a wrong
         field; a mesh that is not safe to mend.
     """
     content = source.content
@@ -84,6 +87,9 @@ def as_text(found: Row, width: int) -> str:
     lines: list[Table | str] = [f"{found['file']}: {found['format']}, {kind}", found["summary"]]
     if "rows" in found:
         lines.append(_extent(found))
+    lines += found.get("told", ())
+    if found.get("mark"):
+        lines += textwrap.wrap(marks.text(found["file"], found["mark"]), width)
     said = {key: value for key, value in found.get("provenance", {}).items() if value}
     said |= {"sha256": found["sha256"]} | found.get("content", {})
     wide = max(len(key) for key in said)
@@ -114,6 +120,7 @@ def _ours(source: Source) -> Row:
         "schema": found.schema.name,
         "version": found.schema.version,
         "summary": f"{found.schema.meaning[0].upper()}{found.schema.meaning[1:]}.",
+        "mark": marks.of_facts(p.facts),
         "rows": len(found),
         **_timing(found),
         "columns": columns,
@@ -150,6 +157,10 @@ def _timing(found: record.Record) -> Row:
 def _json(source: Source) -> Row:
     content = documents.json_document(source)
     name, version = content.get("schema"), content.get("version")
+    if name == skill.SCHEMA:
+        return _skill(source, content)
+    if name is None and _by_hand(source, content):
+        name, version = surface.kind_of(content), content.get("version", 1)
     if not isinstance(name, str):
         name = None
     if name in _READERS:
@@ -164,9 +175,35 @@ def _json(source: Source) -> Row:
     }
 
 
+def _skill(source: Source, content: dict[str, Any]) -> Row:
+    """Describe a skill: what it keeps, what it was taught on, and its mark."""
+    _, file = skill.decode(source)
+    facts = {k: v for k, v in content.items() if k not in ("schema", "version")}
+    return {
+        "ours": True,
+        "schema": skill.SCHEMA,
+        "version": content["version"],
+        "summary": _MEANINGS["skill"],
+        "told": skill_words.lines(file),
+        "mark": marks.of_file(file),
+        "content": facts,
+    }
+
+
+def _by_hand(source: Source, content: dict[str, Any]) -> bool:
+    """Tell whether it is a surface that people wrote, without a schema."""
+    kind = surface.kind_of(content)
+    if kind is None:
+        return False
+    try:
+        surface.DECODERS[kind](source)
+    except InputError:
+        return False
+    return True
+
+
 _READERS: dict[Any, Callable[[Source], object]] = {
-    "skill": skill.decode,
-    "plane": plane.decode,
+    **surface.DECODERS,
     "tool": tool.geometry,
     "pose": pose.decode,
 }
@@ -175,6 +212,8 @@ _READERS: dict[Any, Callable[[Source], object]] = {
 _MEANINGS = {
     "skill": "What fit learned of a stroke, all that generalize needs.",
     "plane": "A plane in the robot's base frame, mm.",
+    "cylinder": "An endless cylinder in the robot's base frame, mm.",
+    "sphere": "A sphere in the robot's base frame, mm.",
     "tool": "Where the tool's tip and the sensor sit on the flange, and the payload.",
     "pose": "Where a part's own frame lies in the robot's base frame.",
     "report": "What report measured.",
@@ -219,7 +258,21 @@ def _mesh(source: Source) -> Row:
 
 
 def _foreign(source: Source) -> Row:
-    table = records_tables.read(source)
+    advice, table = None, None
+    try:
+        if motive.is_motive(source):
+            table = motive.read(source)
+        else:
+            table = records_tables.read(source, decimal=None)
+    except records_tables.HeadlessError as error:
+        advice = str(error).partition(": ")[2]
+        try:
+            recordings.read(source)
+        except InputError as refused:
+            # The reader of recordings knows which option names the columns.
+            advice = str(refused).partition(": ")[2]
+        unnamed = [f"column {i}" for i in range(1, error.count + 1)]
+        table = records_tables.read(source, unnamed, None)
     names = list(table.columns)
     return {
         "ours": False,
@@ -229,7 +282,8 @@ def _foreign(source: Source) -> Row:
         "rows": len(table),
         "columns": [_column(name, table.floats(name)) for name in names],
         "mapping": _mapping(names),
-    }
+        "layouts": layouts.suited(names),
+    } | ({} if advice is None else {"advice": advice})
 
 
 def _column(name: str, values: Floats) -> Row:
@@ -246,10 +300,17 @@ def _column(name: str, values: Floats) -> Row:
 def _mapping(names: Sequence[str]) -> dict[str, str | None]:
     """Guess which column holds t, x, y and z."""
     lower = {name.lower(): name for name in reversed(names)}
-    return {
-        wanted: next((lower[guess] for guess in guesses if guess in lower), None)
-        for wanted, guesses in _GUESSES.items()
-    }
+    suits = layouts.suited(names)
+    known = layouts.LAYOUTS[suits[0]] if suits else layouts.Layout()
+    mapping: dict[str, str | None] = {}
+    for wanted, guesses in _GUESSES.items():
+        guessed = next((lower[guess] for guess in guesses if guess in lower), None)
+        try:
+            column = layouts.found(known, names, wanted)
+        except InputError:
+            column = None
+        mapping[wanted] = guessed if column is None else column.name
+    return mapping
 
 
 def _extent(found: Row) -> str:
@@ -290,31 +351,27 @@ def _number(value: float | None) -> str:
 
 
 def _advice(found: Row) -> str:
-    mapping = found["mapping"]
+    mapping, suits = found["mapping"], found["layouts"]
+    if "advice" in found:
+        return f"fit and report need names: {found['advice']}."
+    if suits:
+        ways = " or ".join(f"--layout {name}" for name in suits)
+        return f"fit and report could read it with {ways}."
     missing = [wanted for wanted, name in mapping.items() if name is None]
+    if missing == ["t"]:
+        return (
+            "fit needs t, x, y and z; no column looks like t: say which with --map t=COLUMN, or "
+            "the rate of the rows with --sample-rate HZ"
+        )
     if missing:
         return (
             f"fit needs t, x, y and z; no column looks like {', '.join(missing)}: "
             "say which with --map, as in --map t=COLUMN"
         )
-    if all(name == wanted for wanted, name in mapping.items()):
-        return "fit reads it as it is, if lengths are in mm and times in s."
-    layout = next(
-        (
-            key
-            for key, known in recordings.LAYOUTS.items()
-            if known.columns
-            and all(known.column(wanted) == name for wanted, name in mapping.items())
-        ),
-        None,
-    )
-    how = (
-        f"--layout {layout}"
-        if layout
-        else " ".join(
-            f"--map {wanted}={name}" for wanted, name in mapping.items() if name != wanted
-        )
-    )
+    if all(layouts.parted(name)[0] == wanted for wanted, name in mapping.items()):
+        told = all(layouts.parted(name)[1] for name in mapping.values())
+        return f"fit reads it as it is{'' if told else ', if lengths are in mm and times in s'}."
+    how = " ".join(f"--map {wanted}={name}" for wanted, name in mapping.items() if name != wanted)
     return f"fit could read it with {how}; it also takes --length-unit and --time-unit."
 
 

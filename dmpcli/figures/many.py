@@ -2,9 +2,9 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -15,12 +15,15 @@ from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.figures import measured
 from dmpcli.figures.footing import AT_ONCE, Ground, placed
-from dmpcli.figures.stroke import LEAST, Stroke, role_of
+from dmpcli.figures.stroke import LEAST, Stroke, as_drawn, over_of, role_of
 from dmpcli.measures.many_deviations import Taught
 from dmpcli.measures.many_motions import many_motions
 from dmpcli.measures.many_waves import ManyWaves, many_waves
-from dmpcli.records import dataset, schemas
+from dmpcli.primitives.contact_heights import ContactHeights
+from dmpcli.records import dataset, marks, schemas
+from dmpcli.records import lesson as lessons
 from dmpcli.records.dataset import Batch, Piece
+from dmpcli.records.lesson import Lesson
 from dmpcli.surfaces import plane
 
 FIGURES = (
@@ -63,6 +66,19 @@ class Some:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """How a skill saw its recordings, and what it changed where it drew; see `Stroke`."""
+
+    lesson: Lesson | None = None
+    over: ContactHeights | None = None
+    size: float = 1.0
+    turn: float = 0.0
+
+
+_AS_TAUGHT = Drawn()
+
+
+@dataclass(frozen=True)
 class Sight:
     """What strokes are measured against.
 
@@ -74,19 +90,37 @@ class Sight:
         The surface of the report.
     normal : array, shape (3,), optional
         Of a surface that is a plane.
+    drawn : Drawn
+        By which skill the demonstration is seen.
     """
 
     reference: Stroke | None = None
     ground: Ground | None = None
     normal: Floats | None = None
+    drawn: Drawn = _AS_TAUGHT
+    _others: dict[Drawn, "Sight"] = field(default_factory=dict, compare=False, repr=False)
+
+    def of_drawn(self, facts: Mapping[str, Any]) -> "Sight":
+        """Return it as seen by the skill that drew a part, whose facts these are."""
+        size, turn = float(facts.get("size", 1.0)), float(facts.get("turn", 0.0))
+        drawn = Drawn(lessons.of_facts(facts), over_of(facts), size, turn)
+        if drawn == self.drawn or self.reference is None:
+            return self
+        if drawn not in self._others:
+            at = self.reference
+            if at.recorded is not None and drawn.lesson is not None:
+                at = at.recorded.stroke(drawn.lesson)
+            self._others[drawn] = replace(self, reference=at, drawn=drawn, _others={})
+        return self._others[drawn]
 
     @cached_property
     def taught(self) -> Taught | None:
-        """The demonstration in its own chart."""
+        """The demonstration in its own chart, as it was to be drawn."""
         at = self.reference
-        if at is None or at.axes is None:
+        if at is None or at.chart is None or at.elsewhere:
             return None
-        return Taught(at.t, (at.position - at.start) @ at.axes)
+        d = self.drawn
+        return Taught(at.t, as_drawn(at.chart, d.over, d.size, d.turn))
 
 
 def measured_parts(
@@ -198,7 +232,8 @@ class _Block:
     def __init__(
         self, batch: Batch, piece: Piece, which: Integers, t: Floats, label: str, sight: Sight
     ) -> None:
-        self.batch, self.piece, self.t, self.label, self.sight = batch, piece, t, label, sight
+        self.batch, self.piece, self.t, self.label = batch, piece, t, label
+        self.sight = sight.of_drawn(piece.facts)
         self.rows, self.first = piece.rows[which], piece.first[which]
         self.facts = piece.facts
         self.role = role_of(piece.facts)
@@ -210,6 +245,7 @@ class _Block:
         self.length = np.linalg.norm(self.goal - self.start, axis=1)
         self.closed = self._closed()
         self.known, self.axes = self._axes()
+        self.aims = self._aims()
 
     def _three(self, names: Sequence[str]) -> Floats:
         n = len(self.t)
@@ -258,7 +294,7 @@ class _Block:
         column = {name: table[:, i] for i, name in enumerate(FIGURES)}
         gap = self.position - self.start.T[:, :, None]
         place = np.einsum("bji,jbn->ibn", self.axes, gap)
-        motions = many_motions(self.t, self.position, self.start, self.goal)
+        motions = many_motions(self.t, self.position, *self.aims)
         for name in ("length", "peak_speed", "ldlj", "sparc"):
             column[name][:] = getattr(motions, name)
         if self.intended:
@@ -280,6 +316,17 @@ class _Block:
         waves = ManyWaves.joined([stroke.wave for stroke in strokes])
         return Some(self.rows, self.role, table, self.t, waves, strokes.__getitem__)
 
+    def _aims(self) -> tuple[Floats, Floats]:
+        """Points where the strokes should begin and end, shape (k, 3) each, mm."""
+        heights = self.facts.get("end_heights")
+        if heights is None:
+            return self.start, self.goal
+        up = np.repeat(self.axes[:, None, :, 2], 2, axis=1)
+        if self.piece.has(*schemas.NORMAL):
+            turning = self._three(schemas.NORMAL)[..., [0, -1]].transpose(1, 2, 0)
+            up = np.where(np.isfinite(turning), turning, up)
+        return self.start + heights[0] * up[:, 0], self.goal + heights[1] * up[:, 1]
+
     def _stretch(self) -> Floats:
         """Start-goal distances of the strokes with a plane over the demonstration's."""
         at = self.sight.reference
@@ -295,8 +342,12 @@ class _Block:
         if taught is None or not which.any():
             return
         found = taught.deviations(self.t, place, stretch)
-        for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
-            column[name][which] = getattr(found, name)
+        assert self.sight.reference is not None
+        rms, largest = self.sight.reference.lost
+        column["nearest_rms"][which] = np.hypot(found.nearest_rms, rms)
+        column["nearest_max"][which] = np.maximum(found.nearest_max, largest)
+        column["phase_rms"][which] = found.phase_rms
+        column["phase_max"][which] = found.phase_max
 
     def _place(self, column: dict[str, Floats], strokes: Sequence[Stroke]) -> None:
         """Fill in how the strokes lie on the surface; on a curved one they are compared there."""
@@ -345,6 +396,8 @@ class _Block:
             side = np.array([columns[c][at.start] for c in schemas.NORMAL])
         elif rotation is not None:
             side = -rotation[0, :, 2]
+        aims = np.stack([ends[i] for ends in self.aims])
+        heights = self.facts.get("end_heights", (0.0, 0.0))
         return Stroke(
             f"{self.label}[{self.batch.ids[row].as_py()}]",
             schemas.TRAJECTORY.name,
@@ -361,6 +414,13 @@ class _Block:
             rotation=rotation,
             side=side,
             bound=self.facts.get("model") != "original",
+            lesson=self.sight.drawn.lesson,
+            end_heights=(heights[0], heights[1]),
+            aims=aims if np.isfinite(aims).all() else None,
+            over=self.sight.drawn.over,
+            size=self.sight.drawn.size,
+            turn=self.sight.drawn.turn,
+            mark=marks.of_facts(self.facts),
         )
 
 

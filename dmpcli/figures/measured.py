@@ -14,9 +14,10 @@ from dmpcli.arrays import Floats
 from dmpcli.figures import lag
 from dmpcli.figures.stroke import Stroke
 from dmpcli.measures import path, surface
-from dmpcli.measures.deviation import deviation, nearest_distance
+from dmpcli.measures.deviation import Deviation, deviation, nearest_distance
 from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
 from dmpcli.measures.timing import punctuality
+from dmpcli.records import marks
 from dmpcli.records.record import Record
 from dmpcli.records.skill import SkillFile
 
@@ -32,13 +33,17 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
     reference : Stroke, optional
         The demonstration; the stroke's deviation is taken from it, start and goal aligned.
     """
-    start_error, goal_error = path.end_errors(stroke.position, stroke.start, stroke.goal)
+    start_error, goal_error = None, None
+    if stroke.intended and stroke.aims is not None:
+        start_error, goal_error = path.end_errors(stroke.position, *stroke.aims)
     return {
         "stroke": stroke.label,
         "kind": stroke.kind,
         "role": stroke.role,
         "simulated": stroke.simulated,
         "closed": stroke.closed,
+        "elsewhere": stroke.elsewhere,
+        "by_skill": stroke.by_skill,
         "samples": len(stroke.t),
         "start": stroke.start.tolist(),
         "goal": stroke.goal.tolist(),
@@ -51,9 +56,11 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
         "guide": _from_guide(stroke),
         "ldlj": _finite(log_dimensionless_jerk(stroke.t, stroke.raw)),
         "sparc": _finite(spectral_arc_length(stroke.t, stroke.raw)),
-        "start_error": start_error if stroke.intended else None,
-        "goal_error": goal_error if stroke.intended else None,
+        "start_error": start_error,
+        "goal_error": goal_error,
+        "end_heights": list(stroke.end_heights),
         "surface": on_surface(stroke),
+        "beyond_tolerance": stroke.mark,
     }
 
 
@@ -67,13 +74,17 @@ def on_surface(stroke: Stroke) -> Row | None:
     length = path.path_length(footing.foot)
     taught = footing.demonstrated
     meant = None if taught is None else path.path_length(taught[:, :2])
-    start_error, goal_error = path.end_errors(stroke.position, footing.start, footing.goal)
+    start_error, goal_error = path.end_errors(stroke.position, *footing.aims(stroke.end_heights))
     return {
         "distance_max": float(footing.distance.max()),
         "distance_rms": _rms(footing.distance),
         "height_least": float(footing.height.min()),
         "height_largest": float(footing.height.max()),
         "lifted_max": footing.lifted,
+        "offset": 0.0 if stroke.over is None else stroke.over.offset,
+        "contact_band": footing.band,
+        "contact_share": footing.touching,
+        "contact_lift": footing.lift,
         "wave_height": None if wave is None else wave.mean,
         "wave_spread": None if wave is None else wave.spread,
         "wave_heights": None if wave is None else wave.heights.tolist(),
@@ -112,10 +123,18 @@ def skill_of(skill: SkillFile) -> Row:
     """What a skill says of itself: its model, and how well it gives back each demonstration."""
     return {
         "model": skill.model,
+        "learning": skill.learning,
         "forcing_scale": skill.forcing_scale,
         "basis": skill.basis,
         "duration": skill.duration,
         "closed": skill.closed,
+        "passes": skill.passes,
+        "surface": None if skill.surface is None else skill.surface.model_dump(mode="json"),
+        "heights": list(skill.heights),
+        "side_guessed": skill.side_guessed,
+        "reached": None if skill.reached is None else skill.reached.model_dump(mode="json"),
+        "beyond_tolerance": marks.of_file(skill),
+        "spread": None if skill.spread is None else skill.spread.model_dump(mode="json"),
         "reproductions": [part.model_dump(mode="json") for part in skill.reproduction],
     }
 
@@ -194,14 +213,20 @@ def _as_recorded(stroke: Stroke) -> Row | None:
     removed = np.linalg.norm(stroke.raw - stroke.position, axis=1)
     raw = replace(stroke, position=stroke.raw)
     return {
-        "wave_height": raw.wave.mean,
+        "wave_height": None if stroke.place is not None else raw.wave.mean,
         "removed_rms": _rms(removed),
         "removed_max": float(removed.max()),
+        "noise": stroke.noise,
+        "lost_rms": stroke.lost[0],
+        "lost_max": stroke.lost[1],
     }
 
 
 def _deviation(stroke: Stroke, reference: Stroke | None) -> Row | None:
     if reference is None or reference is stroke:
+        return None
+    reference = reference.seen_for(stroke)
+    if reference.elsewhere:
         return None
     footing = stroke.footing
     if stroke.axes is None and footing and footing.place is not None:
@@ -209,11 +234,20 @@ def _deviation(stroke: Stroke, reference: Stroke | None) -> Row | None:
             return None
         # On a curved surface strokes are compared in its chart.
         taught = footing.demonstrated
-        return asdict(deviation(stroke.t, footing.place, reference.t, taught))
+        return _from_recording(deviation(stroke.t, footing.place, reference.t, taught), reference)
     aligned = reference.carried_to(stroke)
     if aligned is None:
         return None
-    return asdict(deviation(stroke.t, stroke.position, reference.t, aligned))
+    return _from_recording(deviation(stroke.t, stroke.position, reference.t, aligned), reference)
+
+
+def _from_recording(off: Deviation, reference: Stroke) -> Row:
+    """Deviation from the recording: with what smoothing took off it beyond its noise."""
+    rms, largest = reference.lost
+    return asdict(off) | {
+        "nearest_rms": float(np.hypot(off.nearest_rms, rms)),
+        "nearest_max": max(off.nearest_max, largest),
+    }
 
 
 def _from_guide(stroke: Stroke) -> Row | None:

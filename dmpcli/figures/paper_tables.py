@@ -87,6 +87,7 @@ def _notes(experiment: Experiment, taught: Stroke, here: Sequence[Stroke]) -> li
     literal = next((s for s in here if s.role == "original axis"), None)
     if literal is None or literal.wave.mean is None:
         return []
+    taught = taught.seen_for(literal)
     old, new = (float(s.goal[1] - s.start[1]) for s in (taught, literal))
     if old == 0.0 or abs(new / old - 1.0) < _ALIKE:
         return []

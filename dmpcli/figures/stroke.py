@@ -12,17 +12,20 @@ import numpy as np
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.figures import lag
-from dmpcli.measures.deviation import carried
+from dmpcli.measures.surface import wave_along
 from dmpcli.measures.wave import WaveHeights, stroke_wave
-from dmpcli.primitives import preparation, references, smoothing
-from dmpcli.records import schemas
+from dmpcli.primitives.contact_heights import ContactHeights
+from dmpcli.records import lesson as lessons
+from dmpcli.records import marks, schemas
+from dmpcli.records.lesson import Lesson
 from dmpcli.records.pairs import OK
-from dmpcli.records.record import Provenance, Record
+from dmpcli.records.record import Record
 from dmpcli.records.streams import DASH
 from dmpcli.surfaces import plane
 
 if TYPE_CHECKING:
     from dmpcli.figures.footing import Footing
+    from dmpcli.figures.recorded import Recorded
 
 NEAR = 1.0
 """Strokes whose starts and goals are this near to each other lie at the same place, mm."""
@@ -73,6 +76,35 @@ class Stroke:
         False for a recording of which nobody knows what was to be drawn: a person dragged.
     footing : Footing, optional
         How the stroke lies on a surface that it was measured on.
+    lesson : Lesson, optional
+        How the skill that drew it saw its recordings; of a demonstration, how it is seen.
+    recorded : Recorded, optional
+        What a demonstration is a view of.
+    place : array, shape (n, 3), optional
+        u, v, w of a demonstration on the surface that it was taught on, mm; else its plane's axes
+        tell them.
+    geodesic : float, optional
+        Start-goal distance along that surface, mm.
+    lost : tuple of float
+        RMS and largest of what smoothing took off a demonstration beyond its noise, mm.
+    noise : float
+        Of a demonstration, standard deviation per axis, mm.
+    elsewhere : bool
+        Whether a demonstration was taught on a surface that is not at hand, so that nothing can be
+        compared with it.
+    by_skill : bool
+        Whether its skill's own curve stands for a demonstration whose taught surface is not at
+        hand; `lost` is by how much that curve strays from the recording.
+    end_heights : tuple of float
+        How far above start and goal it should begin and end, mm.
+    aims : array, shape (2, 3), optional
+        Those points, mm; None where the normals there are not known.
+    over : ContactHeights, optional
+        What was drawn of the skill's heights over a surface.
+    size, turn : float
+        Of a closed stroke, beside the demonstration's; rad.
+    mark : dict, optional
+        By how much the skill that drew it misses its tolerance; see `records.marks`.
     """
 
     label: str
@@ -93,19 +125,37 @@ class Stroke:
     bound: bool = True
     staged: bool = True
     footing: "Footing | None" = None
+    lesson: Lesson | None = None
+    recorded: "Recorded | None" = None
+    place: Floats | None = None
+    geodesic: float | None = None
+    lost: tuple[float, float] = (0.0, 0.0)
+    noise: float = 0.0
+    elsewhere: bool = False
+    by_skill: bool = False
+    end_heights: tuple[float, float] = (0.0, 0.0)
+    aims: Floats | None = None
+    over: ContactHeights | None = None
+    size: float = 1.0
+    turn: float = 0.0
+    mark: dict[str, float] | None = None
 
     @cached_property
     def wave(self) -> WaveHeights:
         """Its wave heights; on a curved surface along it. None for a line or a closed stroke."""
         if self.closed:
             return _NONE
+        if self.place is not None:
+            return wave_along(self.place[:, :2], self.length) or _NONE
         if self.axes is None:
             return (self.footing and self.footing.wave) or _NONE
         return stroke_wave(self.position, self.start, self.goal, self.axes[:, 2])
 
     @property
     def length(self) -> float:
-        """Start-goal distance, mm."""
+        """Start-goal distance, along the surface that it was taught on, mm."""
+        if self.geodesic is not None:
+            return self.geodesic
         return float(np.linalg.norm(self.goal - self.start))
 
     def at_place_of(self, other: "Stroke") -> bool:
@@ -113,12 +163,41 @@ class Stroke:
         apart = np.linalg.norm([self.start - other.start, self.goal - other.goal], axis=1)
         return bool(apart.max() <= NEAR)
 
+    @cached_property
+    def chart(self) -> Floats | None:
+        """u, v, w in its own chart, shape (n, 3), mm; None where it has none."""
+        if self.place is not None:
+            return self.place
+        return None if self.axes is None else (self.position - self.start) @ self.axes
+
+    def seen_for(self, other: "Stroke") -> "Stroke":
+        """Return this demonstration as the skill saw it that drew another stroke."""
+        if self.recorded is None or other.lesson is None:
+            return self
+        return self.recorded.stroke(other.lesson)
+
     def carried_to(self, other: "Stroke") -> Floats | None:
         """Positions with start, goal and plane laid upon another stroke's, shape (n, 3), mm."""
-        if self.axes is None or other.axes is None:
+        if self.chart is None or other.axes is None:
             return None
         stretch = 1.0 if self.closed or other.closed else other.length / self.length
-        return carried(self.position, self.start, self.axes, other.start, other.axes, stretch)
+        place = as_drawn(self.chart * [stretch, 1.0, 1.0], other.over, other.size, other.turn)
+        return np.asarray(other.start + place @ other.axes.T)
+
+
+def as_drawn(
+    place: Floats, over: ContactHeights | None, size: float = 1.0, turn: float = 0.0
+) -> Floats:
+    """Chart coordinates (n, 3) of a demonstration as a stroke was to have them.
+
+    Flat where it touches the surface; if closed, larger, and turned about the normal.
+    """
+    if over is None and (size, turn) == (1.0, 0.0):
+        return place
+    c, s = np.cos(turn), np.sin(turn)
+    u, v, w = place.T
+    w = w if over is None else over.drawn(w)
+    return np.column_stack([size * (c * u - s * v), size * (s * u + c * v), w])
 
 
 def strokes_of(
@@ -205,74 +284,6 @@ def labels_of(names: Sequence[str]) -> list[str]:
     return [s if short.count(s) == 1 else name for s, name in zip(short, names, strict=True)]
 
 
-def demonstrated(
-    recording: smoothing.Stroke,
-    label: str,
-    normal: Floats | None = None,
-    origin: Provenance | None = None,
-) -> Stroke:
-    """Return a demonstration as `fit` sees it by default: idle ends cut off, smoothed.
-
-    Parameters
-    ----------
-    recording : smoothing.Stroke
-    label : str
-    normal : array, shape (3,), optional
-        Normal of the plane that it lies on; otherwise the best-fitting one.
-    origin : Provenance, optional
-        Of one of our own files: how it was dragged, along what, and whether it is simulated.
-
-    Raises
-    ------
-    InputError
-        The tool does not move, or hardly a sample of it does.
-    """
-    origin = origin or Provenance("")
-    even = smoothing.evenly_sampled(recording)
-    seen = preparation.prepare(even, preparation.Choices())
-    frame, count = seen.frame, len(seen.stroke.t)
-    _enough(count)
-    first = int(np.argmin(np.abs(even.t - seen.trimmed[0])))
-    axes = frame.axes
-    if normal is not None:
-        tool_axis = None if frame.rotation is None else frame.rotation[:, 2]
-        normal = normal * plane.side(normal, tool_axis)
-        axes = _axes(frame.start, frame.goal, normal, seen.closed)
-    return Stroke(
-        label,
-        schemas.DEMONSTRATION.name,
-        "builtin" if origin.options.get("drag") == "builtin" else "demonstration",
-        seen.stroke.t,
-        seen.stroke.position,
-        even.position[first : first + count],
-        frame.start,
-        frame.goal,
-        axes,
-        seen.closed,
-        False,
-        bool(origin.facts.get("simulated", False)),
-        # A noise-free stroke is its own guide.
-        None if origin.facts.get("noise_free") else _guide(origin.facts.get("reference")),
-        staged=origin.command != "record" or "reference" in origin.facts,
-    )
-
-
-def _guide(said: Any) -> Floats | None:
-    """Return the curve that a demonstration followed, as far as its facts describe one."""
-    if not isinstance(said, dict) or said.get("shape") not in ("sine", "line", "circle"):
-        return None
-    start, goal = (np.asarray(said[key], dtype=float) for key in ("start", "goal"))
-    normal = _axes(start, goal, np.array([0.0, 0.0, 1.0]), closed=False)[:, 2]
-    t = np.linspace(0.0, 1.0, 1001)
-    if said["shape"] == "line":
-        return references.line(start, goal, t, 1.0)
-    if said["shape"] == "circle":
-        return references.circle(start, goal, t, 1.0, normal)
-    return references.sine(
-        start, goal, said["wave_height"], t, 1.0, said.get("periods", 1.0), normal
-    )
-
-
 def _planned(
     record: Record,
     label: str,
@@ -292,9 +303,10 @@ def _planned(
         given = normal if given is None or given @ normal >= 0.0 else -normal
     axes = None
     if given is not None:
-        axes = _axes(start, goal, given, closed)
+        axes = chart_axes(start, goal, given, closed)
     elif not record.has(*schemas.NORMAL):
         axes = plane.stroke_axes(ends)
+    heights = tuple(map(float, known.get("end_heights", (0.0, 0.0))))
     return Stroke(
         label,
         record.schema.name,
@@ -311,7 +323,38 @@ def _planned(
         rotation=record.rotation(),
         side=_side(record, known),
         bound=known.get("model") != "original",
+        lesson=lessons.of_facts(known),
+        end_heights=(heights[0], heights[1]),
+        aims=_aims(start, goal, heights, _normal(known, record), record),
+        over=over_of(known),
+        size=float(known.get("size", 1.0)),
+        turn=float(known.get("turn", 0.0)),
+        mark=marks.of_facts(known),
     )
+
+
+def over_of(facts: Mapping[str, Any]) -> ContactHeights | None:
+    """Return what a trajectory's facts say of the heights that were drawn over a surface."""
+    said = facts.get("over_surface")
+    if said is None:
+        return None
+    return ContactHeights(said["band"], said["removed"], said["offset"], 0.0, 1.0, 0.0)
+
+
+def _aims(
+    start: Floats, goal: Floats, heights: Sequence[float], normal: Floats | None, record: Record
+) -> Floats | None:
+    """Points that a stroke should begin and end at, shape (2, 3), mm; None where not known."""
+    ends = np.stack([start, goal])
+    if not any(heights):
+        return ends
+    if normal is None:
+        if not record.has(*schemas.NORMAL):
+            return None
+        up = record.stack(schemas.NORMAL)[[0, -1]]
+    else:
+        up = np.stack([normal, normal]) / np.linalg.norm(normal)
+    return np.asarray(ends + np.asarray(heights)[:, None] * up)
 
 
 def _side(record: Record, known: Mapping[str, Any]) -> Floats | None:
@@ -334,7 +377,8 @@ def _normal(known: Mapping[str, Any], record: Record) -> Floats | None:
     return normals[0] if np.ptp(normals, axis=0).max() < 1e-6 else None
 
 
-def _axes(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Floats:
+def chart_axes(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Floats:
+    """Axes (3, 3) of a stroke's chart as columns: along, across and off the plane of a normal."""
     n = normal / np.linalg.norm(normal)
     if closed:
         return plane.closed_axes(n)

@@ -6,6 +6,8 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.figures.footing import Ground
+from dmpcli.surfaces.cylinder import Cylinder
+from dmpcli.surfaces.sphere import Sphere
 from dmpcli.surfaces.vectors import any_tangent, unit
 
 MOST_FACES = 2500
@@ -15,6 +17,8 @@ DARK, LIGHT = 0.70, 0.96
 """Greys of a triangle seen edge-on by the light, and facing it."""
 
 LEAST_CORNERS = 3
+
+_STEPS = 34
 
 _FINEST, _COARSER = 70.0, 1.2
 
@@ -47,14 +51,32 @@ def shades(polygons: Sequence[Floats], light: Floats) -> Floats:
 
 
 def _sheet(ground: Ground, low: Floats, high: Floats) -> Floats:
-    """Two triangles of a plane, larger than the box."""
-    hit = ground.surface.closest(0.5 * (low + high))
+    """Triangles of an exact surface that cover its part in the box: two of a plane.
+
+    Of a cylinder and a sphere a chart's grid about the point nearest to the middle of the box.
+    """
+    surface, middle = ground.surface, 0.5 * (low + high)
+    hit = surface.closest(middle)
     e_u = any_tangent(hit.normal)
-    e_v = np.cross(hit.normal, e_u)
-    half = 0.5 * np.linalg.norm(high - low)
-    a, b = hit.position - half * (e_u + e_v), hit.position + half * (e_u - e_v)
-    c, d = hit.position + half * (e_u + e_v), hit.position - half * (e_u - e_v)
-    return np.stack([np.stack([a, b, c]), np.stack([a, c, d])])
+    along = half = float(0.5 * np.linalg.norm(high - low))
+    steps = 1
+    if isinstance(surface, Cylinder | Sphere):
+        steps = _STEPS
+        # Whatever is in the box is no farther from that point, as the crow flies.
+        chord = half + float(hit.distance)
+        angle = 2.0 * np.arcsin(min(1.0, chord / (2.0 * surface.radius)))
+        along = surface.radius * angle
+        half = surface.radius * min(angle, 0.5 * np.pi)
+    if isinstance(surface, Cylinder):
+        e_u, half = np.cross(surface.axis, hit.normal), chord
+    u, v = np.meshgrid(*(r * np.linspace(-1.0, 1.0, steps + 1) for r in (along, half)))
+    shape = (*u.shape, 3)
+    origin, e_u = np.broadcast_to(hit.position, shape), np.broadcast_to(e_u, shape)
+    line = surface.walk(origin, e_u, u)
+    corners = surface.walk(line.position, np.cross(line.normal, line.direction), v).position
+    a, b, c, d = corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]
+    pairs = np.stack([np.stack([a, b, c], axis=-2), np.stack([a, c, d], axis=-2)])
+    return pairs.reshape(-1, 3, 3)
 
 
 def _near(corners: Floats, low: Floats, high: Floats) -> Floats:

@@ -229,25 +229,6 @@ def failures(name: str, rows: Sequence[Row]) -> Table:
     return table
 
 
-def skills(rows: Sequence[tuple[str, Row]]) -> Table:
-    """How well each skill gives back what it was taught."""
-    table = _table(
-        "Reproduction by skills, mm",
-        "skill",
-        *("model", "basis", "time s", "RMS", "max", "end", "smoothed off"),
-    )
-    for name, row in rows:
-        for part in row["reproductions"]:
-            table.add_row(
-                name,
-                row["model"],
-                str(row["basis"]),
-                number(part["duration"], 2),
-                *(number(part[key], 4) for key in ("rms", "largest", "end", "smoothing")),
-            )
-    return table
-
-
 def paper(comparison: Row) -> Table:
     """One of the paper's tables, its wave heights beside ours."""
     table = _table(f"Table {comparison['table']} of the paper: {comparison['title']}, mm", "stroke")

@@ -14,23 +14,8 @@ from dmpcli.measures.wave import LINE, WaveHeights, wave_heights
 Closest = Callable[[Floats], tuple[Floats, Floats]]
 """Points (n, 3), mm, to the closest points of the surface and the unit normals there, (n, 3)."""
 
-Lift = Callable[[Floats], tuple[Floats, Floats, Floats]]
-"""Chart coordinates u, v (b, n, 2), mm, of b strokes to points of the surface, e_u and e_v there,
-(b, n, 3) each; NaN where the chart does not reach.
-"""
-
-SETTLED = 1e-6
-"""Chart coordinates that move by less than this per step are found, mm."""
-
-ASTRAY = 1e-2
-"""Coordinates that lead to a point farther than this from the one sought are none, mm."""
-
 PIECES = 100
 """A stroke's stretch is taken over so many pieces of equal length."""
-
-_MOST_STEPS = 20
-_DIFFERENCE = 0.5
-_LEAST_SLOPE = 0.05
 
 
 def distance(position: Floats, closest: Closest, off: Floats | float = 0.0) -> Floats:
@@ -73,7 +58,18 @@ def height_there(uv: Floats, demonstrated: Floats) -> Floats:
     from scipy.spatial import cKDTree
 
     _, nearest = cKDTree(demonstrated[:, :2]).query(uv)
-    return np.asarray(demonstrated[nearest, 2])
+    # Beside the nearest sample on the nearer of its two segments: a lift is steep.
+    best, found = np.full(len(uv), np.inf), demonstrated[nearest, 2]
+    for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, len(demonstrated) - 2)):
+        way = demonstrated[first + 1] - demonstrated[first]
+        offset = uv - demonstrated[first, :2]
+        size = np.maximum(np.sum(way[:, :2] ** 2, axis=1), 1e-300)
+        share = np.clip(np.sum(offset * way[:, :2], axis=1) / size, 0.0, 1.0)
+        apart = np.linalg.norm(offset - share[:, None] * way[:, :2], axis=1)
+        nearer = apart < best
+        best = np.where(nearer, apart, best)
+        found = np.where(nearer, demonstrated[first, 2] + share * way[:, 2], found)
+    return np.asarray(found)
 
 
 def height(position: Floats, closest: Closest) -> Floats:
@@ -84,56 +80,24 @@ def height(position: Floats, closest: Closest) -> Floats:
     return np.asarray(side * np.linalg.norm(gap, axis=1))
 
 
-def coordinates(foot: Floats, lift: Lift, guess: Floats) -> Floats:
-    """Chart coordinates of points on the surface: the chart inverted by Newton's method.
-
-    v is the length of the geodesic that leaves the start-goal geodesic at a right angle and ends
-    in the point. The residual is projected on the chart's axes; of the chart's metric
-    diag(g², 1) in strip coordinates (A. Gray, Tubes, 2nd ed., Birkhäuser 2004, ch. 2) g is a
-    difference quotient.
-
-    Strokes do not depend on those beside them.
+def contact(position: Floats, height: Floats, band: float) -> tuple[float, float]:
+    """Share of a path that touches a surface, 0 to 1, and the largest height of the rest, mm.
 
     Parameters
     ----------
-    foot : array, shape (b, n, 3)
-        Points of b strokes, mm.
-    lift : callable
-    guess : array, shape (b, n, 2)
-        mm; need not be near.
-
-    Returns
-    -------
-    array, shape (b, n, 2)
-        u, v, mm; NaN for points that the chart does not reach.
+    position : array, shape (n, 3)
+        mm.
+    height : array, shape (n,)
+        Signed, over the surface, mm.
+    band : float
+        Up to this height, or depth, it touches, mm.
     """
-    at = np.array(guess, dtype=float)
-    n = at.shape[1]
-    reach = 2.0 * np.abs(at).max(axis=(1, 2), keepdims=True) + 10.0
-    looking = np.ones((len(at), 1, 1), dtype=bool)
-    for _ in range(_MOST_STEPS):
-        # Both places in one: what carries them there need be prepared only once.
-        both = np.concatenate([at, at + np.array([_DIFFERENCE, 0.0])], axis=1)
-        points, along, aside = lift(both)
-        point, ahead, e_u, e_v = points[:, :n], points[:, n:], along[:, :n], aside[:, :n]
-        slope = np.sum((ahead - point) * e_u, axis=-1) / _DIFFERENCE
-        gap = foot - point
-        move = np.stack(
-            [
-                np.sum(gap * e_u, axis=-1) / np.maximum(slope, _LEAST_SLOPE),
-                np.sum(gap * e_v, axis=-1),
-            ],
-            axis=-1,
-        )
-        # Beyond the border the way back is unknown: such a point tries again nearer the middle.
-        lost = ~np.isfinite(move).all(axis=-1)
-        move[lost] = -0.5 * at[lost]
-        at = np.where(looking, np.clip(at + move, -reach, reach), at)
-        looking &= np.abs(move).max(axis=(1, 2), keepdims=True) >= SETTLED
-        if not looking.any():
-            break
-    found = np.linalg.norm(gap, axis=-1) < ASTRAY
-    return np.where(found[..., None], at, np.nan)
+    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    share = np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])
+    touching = np.abs(height) <= band
+    total = float(share.sum())
+    part = float(share[touching].sum()) / total if total > 0.0 else float(touching.mean())
+    return min(1.0, part), max(0.0, float(height[~touching].max(initial=0.0)))
 
 
 def wave_along(uv: Floats, length: float) -> WaveHeights | None:
@@ -142,7 +106,7 @@ def wave_along(uv: Floats, length: float) -> WaveHeights | None:
     Parameters
     ----------
     uv : array, shape (n, 2)
-        Of `coordinates`, mm.
+        u, v, mm.
     length : float
         Of the start-goal geodesic, mm.
 

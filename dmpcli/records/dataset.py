@@ -276,6 +276,11 @@ def _footer(batch: Batch, file: str) -> tuple[pq.ParquetFile, Provenance]:
     return part, found
 
 
+def facts_of(batch: Batch) -> dict[str, Any]:
+    """Return the facts of a batch's first part; all of them have the same skill."""
+    return dict(_footer(batch, batch.files[0])[1].facts) if batch.files else {}
+
+
 def pieces(
     batch: Batch, columns: Sequence[str], parts: Sequence[int] | None = None
 ) -> Iterator[Piece]:

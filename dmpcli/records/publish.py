@@ -4,11 +4,13 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from dmpcli.records import manifest, plane, pose, skill, tool
+from dmpcli.records import cylinder, manifest, plane, pose, skill, sphere, tool
 
 SCHEMAS = {
     "skill": skill.schema,
     "plane": plane.schema,
+    "cylinder": cylinder.schema,
+    "sphere": sphere.schema,
     "tool": tool.schema,
     "pose": pose.schema,
     "manifest": manifest.schema,

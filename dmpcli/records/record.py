@@ -340,15 +340,33 @@ def _sound_stroke(said: object) -> bool:
     return isinstance(said, dict) and isinstance(said.get("id"), str) and _sound_facts(said)
 
 
+_SIZES = {
+    **dict.fromkeys(("normal", "start", "goal"), 3),
+    **dict.fromkeys(("k", "d", "alpha_e"), 6),
+    "end_heights": 2,
+}
+_GROUPS = {
+    "beyond_tolerance": ("tolerance", "rms", "largest"),
+    "over_surface": ("band", "removed", "offset"),
+}
+_NUMBERS = ("tau", "duration", "rate", "size", "turn")
+
+
 def _sound_facts(facts: dict[str, Any]) -> bool:
-    sizes = dict.fromkeys(("normal", "start", "goal"), 3) | dict.fromkeys(("k", "d", "alpha_e"), 6)
-    return all(
+    lists = (
         isinstance(facts[key], list)
         and len(facts[key]) == size
         and all(_is_number(value) for value in facts[key])
-        for key, size in sizes.items()
+        for key, size in _SIZES.items()
         if key in facts
-    ) and all(_is_number(facts[key]) for key in ("tau", "duration", "rate") if key in facts)
+    )
+    groups = (
+        isinstance(facts[key], dict) and all(_is_number(facts[key].get(name)) for name in names)
+        for key, names in _GROUPS.items()
+        if key in facts
+    )
+    numbers = (_is_number(facts[key]) for key in _NUMBERS if key in facts)
+    return all(lists) and all(groups) and all(numbers)
 
 
 def _is_number(value: object) -> bool:

@@ -18,6 +18,9 @@ DASH = "-"
 JOURNAL = ".journal"
 """Suffix of the journal of a run that has not come to its end."""
 
+LARGEST = 2 * 2**30
+"""Bytes of an input that is read whole; journals may be longer."""
+
 _ARROW_STREAM = b"\xff\xff\xff\xff"
 
 
@@ -50,7 +53,7 @@ def read(path: str | Path, journal: bool = False) -> Source:
     Raises
     ------
     InputError
-        The file is missing, a directory, empty or not readable; or it is a journal.
+        The file is missing, a directory, empty, too large or not readable; or it is a journal.
     """
     if str(path) == DASH:
         if sys.stdin is None:
@@ -61,6 +64,12 @@ def read(path: str | Path, journal: bool = False) -> Source:
         if file.is_dir():
             raise InputError(f"{path}: is a directory, a file is needed here")
         try:
+            size = file.stat().st_size
+            if size > LARGEST and not journal:
+                raise InputError(
+                    f"{path}: has {size / 2**30:.1f} GiB, more than the {LARGEST / 2**30:.0f} GiB "
+                    "that are read at once; cut it in parts, or leave out what is not needed"
+                )
             source = Source(str(path), file.read_bytes())
         except FileNotFoundError:
             raise InputError(f"{path}: no such file; check the name") from None

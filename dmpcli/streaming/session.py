@@ -34,7 +34,7 @@ SENSOR_RATE = 100.0
 ZERO_TIME = 0.5
 
 
-def scene(stroke: Stroke, presses: bool) -> Scene:
+def scene(stroke: Stroke, presses: bool, height: float = 0.0) -> Scene:
     """Return the mock lab where its URL says nothing.
 
     The arm is parked at the stroke's first pose. There is a plate only for a force coupling, which
@@ -45,12 +45,15 @@ def scene(stroke: Stroke, presses: bool) -> Scene:
     stroke : Stroke
     presses : bool
         Whether the force coupling is on.
+    height : float
+        How far above the plate the stroke begins, mm.
     """
     lab = replace(Scene(), position=stroke.position[0])
     if stroke.rotation is not None:
         lab = replace(lab, rotation=stroke.rotation[0])
     if presses and stroke.normal is not None:
-        lab = replace(lab, plate=Plate(stroke.position[0], stroke.normal[0]))
+        normal = stroke.normal[0]
+        lab = replace(lab, plate=Plate(stroke.position[0] - height * normal, normal))
     return lab
 
 

@@ -28,7 +28,7 @@ def recording(tmp_path):
 def test_it_prints_reproduction_rms_and_wave_height(recording, tmp_path):
     done = run(recording, "-o", tmp_path / "s.json")
     assert done.exit_code == 0
-    assert "reproduction RMS 0.039" in done.stderr
+    assert "reproduction RMS 0.0219" in done.stderr
     assert "wave height 49.979 mm demonstrated, 49.935 mm reproduced" in done.stderr
     assert done.stdout == ""
 
@@ -81,7 +81,7 @@ def test_other_recorders_are_read_by_layout(recording, tmp_path):
         (["--regression", "magic"], "--regression = 'magic'"),
         (["--model", "newest"], "--model = 'newest'"),
         (["--preset", "none"], "--preset none: no such preset"),
-        (["--layout", "kuka"], "--layout kuka: no such layout; there are ur, tum"),
+        (["--layout", "abacus"], "--layout abacus: no such layout; there are ur, tum"),
         (["--map", "x"], "--map x: must be OURS=THEIRS"),
         (["--map", "x=tool_x"], "column 'tool_x' is missing"),
         (["--config", "none.toml"], "none.toml: no such file"),

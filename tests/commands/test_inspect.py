@@ -147,7 +147,13 @@ def test_bad_input_is_one_clear_error(tmp_path):
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("stl", "binary STL"), ("stl_ascii", "text STL"), ("obj", "OBJ"), ("ply", "PLY")],
+    [
+        ("stl", "binary STL"),
+        ("stl_ascii", "text STL"),
+        ("obj", "OBJ"),
+        ("ply", "PLY"),
+        ("off", "OFF"),
+    ],
 )
 def test_meshes_tell_their_size_pieces_borders_and_fineness(tmp_path, kind, name):
     path = tmp_path / "part"
@@ -161,6 +167,7 @@ def test_meshes_tell_their_size_pieces_borders_and_fineness(tmp_path, kind, name
     assert content["likely_unit"] == "mm"
     # Chords of edges of 10 mm, and diagonals, on z = (x² - y²) / 240.
     assert content["error_largest"] == pytest.approx(10.0**2 / 960, rel=0.2)
+    assert content["noisy_share"] == 0.0
     text = dmpcli(path).stdout
     assert max(map(len, text.splitlines())) <= 80
     assert "faces" in text
@@ -186,3 +193,54 @@ def test_what_mending_did_to_a_mesh_is_told_and_the_rest_refused(tmp_path):
     result = dmpcli(path)
     assert result.exit_code == 2
     assert "part.obj" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("part.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\n", "a STEP file"),
+        ("part.glb", b"glTF\2\0\0\0\x0c\0\0\0", "a GLB file"),
+        ("part.dae", b"<?xml version='1.0'?>\n<COLLADA>", "a DAE file"),
+    ],
+)
+def test_formats_of_parts_that_are_not_read_are_named_with_what_to_do(
+    tmp_path, name, content, what
+):
+    path = tmp_path / name
+    path.write_bytes(content)
+    result = dmpcli(path)
+    assert result.exit_code == 2
+    assert f"{name}: is {what}" in result.stderr
+    assert "export the part as STL, OBJ, PLY or OFF" in result.stderr
+
+
+def test_a_closed_mesh_tells_its_area_and_volume_and_an_open_one_its_area(tmp_path):
+    V, F = box()
+    path = tmp_path / "box.off"
+    path.write_bytes(written(V, F, "off"))
+    content = found(path)["content"]
+    assert content["area"] == pytest.approx(2200.0)
+    assert content["volume"] == pytest.approx(6000.0)
+    path.write_bytes(written(V, F[1:], "off"))
+    assert found(path)["content"]["volume"] is None
+
+
+def test_a_large_mesh_is_said_to_take_a_while(tmp_path, monkeypatch):
+    from dmpcli.records import mesh
+
+    path = tmp_path / "part.ply"
+    path.write_bytes(written(*grid(), "ply"))
+    assert "takes a while" not in dmpcli(path).stderr
+    monkeypatch.setattr(mesh, "LONG", 1000)
+    result = dmpcli(path, "--json")
+    assert "part.ply: reading a mesh of 0 MB takes a while" in result.stderr
+    assert json.loads(result.stdout)["found"]["format"] == "PLY"
+
+
+def test_a_file_larger_than_memory_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "part.stl"
+    with path.open("wb") as file:
+        file.truncate(3 * 2**30)  # takes no room on the disk
+    result = dmpcli(path)
+    assert result.exit_code == 2
+    assert "part.stl: has 3.0 GiB, more than the 2 GiB" in result.stderr

@@ -3,6 +3,7 @@
 import numpy as np
 
 from dmpcli import rotations
+from dmpcli.figures.recorded import Recorded
 from dmpcli.measures.paper import GENERALIZATION, REPRODUCTION
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record, encode
@@ -36,6 +37,11 @@ def demonstration(path=None, drag="admittance", noise=0.0, facts=None, dt=0.02):
     columns = {"t": np.arange(len(path)) * dt} | dict(zip(POSITION, path.T, strict=True))
     said = {"simulated": True, "reference": {"shape": "csv"}} | (facts or {})
     return Record(schemas.DEMONSTRATION, columns, Provenance("record", {"drag": drag}, (), said))
+
+
+def demonstrated(recording, label, normal=None, origin=None, lesson=None):
+    """A recording as a stroke of the report."""
+    return Recorded(recording, label, normal=normal, origin=origin or Provenance("")).stroke(lesson)
 
 
 def trajectory(path, ids=None, dt=0.02, **facts):

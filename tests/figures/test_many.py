@@ -8,7 +8,7 @@ from dmpcli.figures import measured
 from dmpcli.figures.batch import histogram, measure
 from dmpcli.figures.footing import Ground, placed
 from dmpcli.figures.many import FIGURES, Sight, measured_parts
-from dmpcli.figures.stroke import demonstrated, pairs_of, strokes_of
+from dmpcli.figures.stroke import pairs_of, strokes_of
 from dmpcli.primitives.smoothing import Stroke as Recording
 from dmpcli.records import dataset, record, schemas, streams
 from dmpcli.surfaces.mesh import Mesh
@@ -17,6 +17,7 @@ from tests.figures.batches import put_batch
 from tests.figures.example_files import (
     START,
     circle,
+    demonstrated,
     fillet_mesh,
     fillet_wave,
     on_fillet,

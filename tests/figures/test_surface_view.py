@@ -8,16 +8,18 @@ import pytest
 from dmpcli.figures import document, gallery
 from dmpcli.figures.footing import Ground, placed
 from dmpcli.figures.measured import row_of
-from dmpcli.figures.stroke import demonstrated, strokes_of
+from dmpcli.figures.stroke import strokes_of
 from dmpcli.figures.surface_picture import MOST_FACES, picture
 from dmpcli.figures.surface_view import surface_view
 from dmpcli.primitives import smoothing
+from dmpcli.records.lesson import Lesson
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
 from tests.figures.example_files import (
     CURVED_GOAL,
     CURVED_START,
     curved_trajectory,
+    demonstrated,
     demonstration,
     fillet_mesh,
     fillet_wave,
@@ -33,10 +35,10 @@ def ground():
     return Ground("fillet.stl", Mesh(V, F), V, F)
 
 
-def taught(path=None):
+def taught(path=None, lesson=None):
     record = demonstration(path)
     return demonstrated(
-        smoothing.Stroke(record.t, record.position()), "demo", None, record.provenance
+        smoothing.Stroke(record.t, record.position()), "demo", None, record.provenance, lesson
     )
 
 
@@ -87,8 +89,8 @@ def test_the_demonstrations_own_height_is_taken_off(ground):
     path, normal = fillet_wave(49.979)
     record = curved_trajectory(path + lift[:, None] * normal, normal)
     (stroke,) = strokes_of(record, "lifted")
-    # Smooth as a hand's, so that a best-fitting plane keeps nearly all of it.
-    reference = taught(wave() + lift[:, None] * [0.0, 0.0, 1.0])
+    # On the plane of the skill: the one that the path alone tells leans over the lift.
+    reference = taught(wave() + lift[:, None] * [0.0, 0.0, 1.0], Lesson(normal=(0.0, 0.0, 1.0)))
     alone = placed([stroke], ground, None)[0].footing
     beside = placed([stroke], ground, reference)[0].footing
     assert alone.distance.max() == pytest.approx(0.2, abs=0.01)

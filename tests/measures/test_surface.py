@@ -45,52 +45,22 @@ def closest_on_sphere(points):
     return R * normal, normal
 
 
-def flat_guess(points):
-    """Coordinates as on the plane that touches at the start."""
-    return np.column_stack([points @ [0.0, 1.0, 0.0], points @ [0.0, 0.0, 1.0]])
-
-
-def found(foot, lift, guess):
-    """Coordinates of one stroke."""
-
-    def batched(uv):
-        return tuple(a.reshape(*uv.shape[:2], 3) for a in lift(uv.reshape(-1, 2)))
-
-    return surface.coordinates(foot[None], batched, guess[None])[0]
-
-
-@pytest.mark.parametrize("lift", [on_cylinder, on_sphere])
-def test_coordinates_are_found_from_the_points_alone(lift):
-    uv = stroke()
-    point = lift(uv)[0]
-    guess = np.column_stack([np.linspace(0, 60.0, len(uv)), np.zeros(len(uv))])
-    assert np.abs(found(point, lift, guess) - uv).max() < 1e-9
-
-
-def test_v_is_the_length_of_the_perpendicular_geodesic_and_not_the_chord():
-    point = R * np.array([[np.cos(0.4), 0.0, np.sin(0.4)]])
-    ((u, v),) = found(point, on_sphere, flat_guess(point))
-    assert u == pytest.approx(0.0, abs=1e-9)
-    assert v == pytest.approx(0.4 * R, abs=1e-9)
-    assert v - R * np.sin(0.4) > 0.5
-
-
-def test_points_beside_the_chart_have_no_coordinates():
-    def half(uv):
-        point, e_u, e_v = on_sphere(uv)
-        return np.where(uv[:, 1:] > 10.0, np.nan, point), e_u, e_v
-
-    point = on_sphere(np.array([[30.0, 5.0], [30.0, 20.0]]))[0]
-    there = found(point, half, flat_guess(point))
-    assert there[0] == pytest.approx([30.0, 5.0])
-    assert np.isnan(there[1]).all()
-    assert surface.wave_along(there, LENGTH) is None
-
-
 def test_wave_height_is_measured_along_the_surface():
-    uv = found(on_sphere(stroke(49.98))[0], on_sphere, stroke(30.0))
-    assert surface.wave_along(uv, LENGTH).mean == pytest.approx(49.98, abs=1e-3)
+    assert surface.wave_along(stroke(49.98), LENGTH).mean == pytest.approx(49.98, abs=1e-3)
     assert surface.wave_along(stroke(0.1), LENGTH).mean is None
+    assert surface.wave_along(np.full((5, 2), np.nan), LENGTH) is None
+
+
+def test_contact_is_told_by_the_share_of_the_path_and_the_lift_of_the_rest():
+    # 30 mm down, 8 mm up within 2 mm, 40 mm lifted: samples crowd where the pen is down.
+    x = np.concatenate([np.linspace(0.0, 30.0, 3001), np.linspace(32.0, 72.0, 41)])
+    height = np.where(x > 31.0, 8.0, 0.2)
+    touching, lift = surface.contact(np.column_stack([x, 0 * x, height]), height, 1.0)
+    assert touching == pytest.approx(30.0 / 72.0, abs=0.08)
+    assert lift == 8.0
+    assert surface.contact(np.column_stack([x, 0 * x, 0 * x]), 0 * x, 1.0) == (1.0, 0.0)
+    # A tool that stands still has no path to have a share of.
+    assert surface.contact(np.zeros((4, 3)), np.array([0.0, 0.0, 0.0, 5.0]), 1.0) == (0.75, 5.0)
 
 
 def test_distance_leaves_out_the_intended_height():

@@ -143,6 +143,9 @@ NUMBERS = {"t": [0.0, 1.0], "x": [0.0, 1.0], "y": [0.0, 1.0], "z": [0.0, 1.0]}
         (with_header(NUMBERS, facts={"normal": [0, 1]}), "metadata are damaged"),
         (with_header(NUMBERS, facts={"start": "x"}), "metadata are damaged"),
         (with_header(NUMBERS, facts={"tau": "soon"}), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"end_heights": [8.0]}), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"beyond_tolerance": {"rms": 1.0}}), "metadata are damaged"),
+        (with_header(NUMBERS, facts={"over_surface": 2.0}), "metadata are damaged"),
     ],
 )
 def test_what_is_wrong_is_named_with_column_and_row(table, message):

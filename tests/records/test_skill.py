@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.records import plane, publish, skill
 from dmpcli.records.record import Provenance
 from dmpcli.records.streams import Source

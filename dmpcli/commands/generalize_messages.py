@@ -1,0 +1,153 @@
+"""What `generalize` says of a skill and of where it is drawn, before and beside the outcome."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dmpcli.arrays import Floats, Integers
+    from dmpcli.primitives.admission import Admission
+    from dmpcli.primitives.drawing import Style
+    from dmpcli.primitives.skill import Skill
+    from dmpcli.records.pairs import PairTable
+    from dmpcli.surfaces.protocol import Surface
+
+_SHOWN_OFFSET = 0.05
+_UNDECIDED = 5.0
+
+
+def mark(skill: "Skill", name: str) -> str | None:
+    """Return the warning that a skill beyond its tolerance carries; None of a good one."""
+    from dmpcli.records import marks
+
+    found = marks.of_reached(skill.reached)
+    return None if found is None else marks.text(name, found)
+
+
+def reason(verdict: "Admission", i: int, tolerance: float, skill: "Skill") -> str:
+    """Say what stands against a pair, and what to do."""
+    from dmpcli.primitives.admission import MOST_SAMPLES
+
+    if verdict.coincident[i]:
+        return "start and goal are one point, and the stroke is open; set them apart"
+    if verdict.short[i]:
+        return (
+            "--ease-in and --ease-out together are longer than twice the stroke; "
+            "shorten them, or give a longer --duration"
+        )
+    if verdict.endless[i]:
+        return f"more than {MOST_SAMPLES} samples; shorten --duration or lower --rate"
+    if verdict.far[i]:
+        return (
+            f"start or goal lies {verdict.distance[i]:.3f} mm off the surface, more than "
+            f"--snap-tol {tolerance:g}; move the point, or raise the tolerance"
+        )
+    if verdict.upright[i]:
+        return (
+            "the line from start to goal stands upright on the plane, so that no chart follows; "
+            "give the plane to draw on with --surface plane.json"
+        )
+    if verdict.deep[i]:
+        return (
+            f"the stroke would go {verdict.depth[i]:.2f} mm into the surface, since it was taught "
+            "on another one; name that one with fit --surface, allow the depth with --contact, or "
+            "lift the stroke with --offset"
+        )
+    if skill.closed:
+        return (
+            "the stroke is closed, and its goal lies far from its start, which makes another "
+            "stroke of it; give the start as goal, or ask for it with --allow-stretch"
+        )
+    return (
+        f"the start-goal distance is {verdict.stretch[i]:.3g} times the demonstrated "
+        f"{skill.frame.length:.3g} mm, which makes another stroke of it; check the unit of start "
+        "and goal, or ask for it with --allow-stretch"
+    )
+
+
+def tell_of_surface(
+    skill: "Skill", style: "Style", given: "Surface", table: "PairTable", name: str, quiet: bool
+) -> None:
+    """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over."""
+    from dmpcli.commands.messages import tell, warn
+    from dmpcli.primitives.drawing import turned_over
+
+    start = table.pairs[table.good.nonzero()[0]].start
+    if skill.side_guessed:
+        _tell_of_side(skill, given, start, name, quiet)
+    over = turned_over(skill, table.pairs[table.good.nonzero()[0]], given)
+    for heights, seen in ((style.heights, not over.all()), (style.heights_over, over.any())):
+        if heights is None or not seen or heights.deep:
+            continue
+        if abs(heights.removed) >= _SHOWN_OFFSET:
+            tell(
+                f"{name}: the stroke was taught {abs(heights.removed):.2f} mm "
+                f"{'off' if heights.removed > 0.0 else 'inside'} its surface, which is taken off; "
+                "--contact 0 draws it so",
+                quiet,
+            )
+        if heights.touching < 0.5:
+            warn(
+                f"{name}: only {100.0 * heights.touching:.0f} % of the stroke touches the surface; "
+                "it was taught in the air or on a curved part: name that with fit --surface, or "
+                "shift it with --offset"
+            )
+        elif heights.lift > max(heights.band, heights.offset + 1e-9):
+            tell(
+                f"{name}: lifted by up to {heights.lift:.2f} mm over "
+                f"{100.0 * (1.0 - heights.touching):.0f} % of the path, as taught",
+                quiet,
+            )
+
+
+def _tell_of_side(
+    skill: "Skill", given: "Surface", start: "Floats", name: str, quiet: bool
+) -> None:
+    import numpy as np
+
+    from dmpcli.commands.messages import tell, warn
+    from dmpcli.primitives.drawing import normals_at
+
+    if not len(start):
+        return
+    cosine = normals_at(given, start) @ skill.frame.normal
+    angle = np.degrees(np.arccos(np.clip(np.abs(cosine), 0.0, 1.0)))
+    if (angle > 90.0 - _UNDECIDED).any():
+        warn(
+            f"{name}: the stroke was taught without orientation on a plane square to this surface, "
+            "so that it may come out mirrored; name the plane with fit --normal"
+        )
+    elif (cosine < 0.0).any():
+        tell(
+            f"{name}: the stroke was taught without orientation; it is seen from this surface's "
+            "side",
+            quiet,
+        )
+
+
+def tell_of_stretch(verdict: "Admission", rows: "Integers", skill: "Skill", table: str) -> None:
+    """Warn of strokes whose start-goal distance is far from the demonstrated one."""
+    from dmpcli.commands.messages import warn
+    from dmpcli.primitives.admission import LONG_STRETCH, nearly_closed
+
+    stretch = verdict.stretch[rows]
+    far = (stretch > LONG_STRETCH) | (stretch < 1.0 / LONG_STRETCH)
+    if skill.closed:
+        far = stretch > 1.01
+    elif nearly_closed(skill):
+        far = (stretch > 1.01) | (stretch < 0.99)
+    if not far.any():
+        return
+    worst = float(stretch[far][abs(_logs(stretch[far])).argmax()])
+    of = f"{int(far.sum())} of {len(rows)} strokes, the worst" if len(rows) > 1 else "the stroke"
+    warn(
+        f"{table}: {of} is stretched along start-goal by {worst:.3g}; check the unit of start and "
+        "goal"
+        if not nearly_closed(skill)
+        else f"{table}: {of} is stretched along start-goal by {worst:.3g}: the demonstration is "
+        "nearly closed, so that its start and goal tell its size badly"
+    )
+
+
+def _logs(stretch: "Floats") -> "Floats":
+    import numpy as np
+
+    return np.asarray(np.log(stretch))

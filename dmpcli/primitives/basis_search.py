@@ -1,0 +1,295 @@
+"""As many basis functions as the stroke needs, and weights that end it on its goal.
+
+The paper's N = 80 carries one wave; twenty loops come out flat. So N begins there and grows until
+the reproduction is within the tolerance. LWR's error is the bias of its kernels, about N⁻² where
+the stroke is smooth, which tells the next N.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.measures.wave import LINE, wave_heights
+from dmpcli.primitives import dynamics, end_conditions
+from dmpcli.primitives.curve import Curve
+from dmpcli.primitives.dynamics import Spring
+from dmpcli.primitives.phase import Basis, WidthRule, even_in_time, phase
+from dmpcli.primitives.regression import BandedRegression, Method, target_forcing
+
+FIRST = 80
+MOST = 2000
+PASSES = 3
+# Largest deviation, in tolerances.
+LARGEST = 4.0
+# Deviation of the tool's orientation that is always allowed, rad.
+ANGLE = np.radians(0.1)
+# Samples for each basis function, and the fewest in all.
+_SAMPLES = 8
+_FEWEST = 640
+# N may be so many times the pieces that the recording's band holds.
+_BEYOND_BAND = 16
+# A forced response below this part of the extent does not tell alpha_f.
+NEGLIGIBLE = 1e-9
+# Nor does one that is but rounding, mm and rad.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a reproduction may be from the demonstration.
+
+    Attributes
+    ----------
+    length : float
+        RMS and wave height, and `LARGEST` of it anywhere, mm.
+    angle : float
+        rad.
+    """
+
+    length: float
+    angle: float = ANGLE
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How far a reproduction is from the demonstration.
+
+    Attributes
+    ----------
+    rms, largest : float
+        Distance to the nearest point, mm.
+    end : float
+        Of the last sample, mm.
+    wave : tuple of float, or None
+        Mean wave height, demonstrated and reproduced, mm; None where there is no wave.
+    angle : float
+        Largest, at equal times, rad.
+    """
+
+    rms: float
+    largest: float
+    end: float
+    wave: tuple[float, float] | None
+    angle: float
+
+    def excess(self, tolerance: Tolerance) -> float:
+        """Return the largest ratio of a deviation to what is allowed; at most 1 is within."""
+        wave = 0.0 if self.wave is None else abs(self.wave[1] - self.wave[0])
+        return max(
+            max(self.rms, wave, self.largest / LARGEST) / tolerance.length,
+            self.angle / tolerance.angle,
+        )
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of one N, and what they reach.
+
+    Attributes
+    ----------
+    basis : Basis
+    passes : int
+        Of LWR.
+    weights : array, shape (6, N)
+    alpha_f : array, shape (6,)
+    initial_velocity : array, shape (6,)
+        V0 = tau dx/dt(0).
+    demonstrated, reproduced : array, shape (T, 6)
+        What was to be learned, and what the weights make of it, at even times.
+    quality : Quality
+        Of the one beside the other.
+    """
+
+    basis: Basis
+    passes: int
+    weights: Floats
+    alpha_f: Floats
+    initial_velocity: Floats
+    demonstrated: Floats
+    reproduced: Floats
+    quality: Quality
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be learned, and how.
+
+    Attributes
+    ----------
+    curve : Curve
+        The mean demonstration in the skill's six coordinates.
+    spring : Spring
+    alpha_1 : float
+    widths : {'spacing', 'power'}
+    closed : bool
+        Whether the stroke has no start-goal line, and so no wave.
+    """
+
+    curve: Curve
+    spring: Spring
+    alpha_1: float
+    widths: WidthRule
+    closed: bool
+
+    def learn(self, count: int, method: Method, passes: int | None) -> Iterator[Weights]:
+        """Learn N weights, with one pass of LWR, then with more; ridge has one.
+
+        Parameters
+        ----------
+        count : int
+            N.
+        method : {'lwr', 'ridge'}
+        passes : int or None
+            So many alone; None tries 1, 2, ... `PASSES` as they are asked for.
+        """
+        spring, duration = self.spring, self.curve.duration
+        samples = max(_SAMPLES * (count - 1), _FEWEST) + 1
+        t = np.linspace(0.0, duration, samples)
+        s = phase(t, spring.tau, self.alpha_1)
+        basis = even_in_time(count, duration, spring.tau, self.alpha_1, self.widths)
+        regression = BandedRegression(basis, s)
+        target = self.curve.limited(count)
+        start, goal = self.curve(t[[0, -1]])
+        x, velocity = target(t), target(t, 1)
+        forcing = target_forcing(spring, goal, x, velocity, target(t, 2))
+        V0, V_end = spring.tau * velocity[0], spring.tau * velocity[-1]
+        a, b, c = dynamics.homogeneous(spring, t)
+        rest = start * a + goal * b + V0 * c
+        demonstrated = self.curve(t)
+        single = Spring(spring.k[:1], spring.d[:1], spring.tau)
+        C = end_conditions.end_responses(single, basis, self.alpha_1, duration)
+        moves = regression.least_change(method, C)
+        E = dynamics.transition(spring, np.array(duration))
+        required = np.stack(
+            [
+                (goal - start) * E[:, 0, 0] - V0 * E[:, 0, 1],
+                V_end - (start - goal) * E[:, 1, 0] - V0 * E[:, 1, 1],
+            ],
+            axis=1,
+        )
+        rounds = (passes,) if passes else (1,) if method == "ridge" else range(1, PASSES + 1)
+        for number in rounds:
+            weights = regression.fit(method, forcing, number)
+            both = np.concatenate([weights, moves.T])
+            response = self._forced(basis, both, t)
+            forced, moved = response[:, :6], response[:, 6:]
+            alpha_f = _alpha_f(demonstrated - rest, forced, demonstrated)
+            if count > 1:
+                m = end_conditions.corrections(weights, required / alpha_f[:, None], C, moves)
+                weights, forced = weights + m @ moves.T, forced + moved @ m.T
+            reproduced = rest + alpha_f * forced
+            quality = judged(demonstrated, reproduced, self.closed)
+            yield Weights(basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality)
+
+    def _forced(self, basis: Basis, weights: Floats, t: Floats) -> Floats:
+        """Response to the forcing terms of weights (D, N), shape (T, D)."""
+        ones = np.ones(len(weights))
+        spring = Spring(self.spring.k[0] * ones, self.spring.d[0] * ones, self.spring.tau)
+
+        def forcing(at: Floats) -> Floats:
+            s = phase(at, spring.tau, self.alpha_1)
+            f = basis.mean(s, weights)
+            f *= s[..., None]
+            return f
+
+        step = dynamics.longest_step(spring, self.curve.duration, len(basis))
+        return dynamics.forced(spring, forcing, t, step)
+
+
+def judged(demonstrated: Floats, reproduced: Floats, closed: bool) -> Quality:
+    """Hold a reproduction (T, 6) against a demonstration at the same times (T, 6)."""
+    near = nearest(demonstrated[:, :3], reproduced[:, :3])
+    return Quality(
+        float(np.sqrt(np.mean(near**2))),
+        float(near.max()),
+        float(np.linalg.norm(reproduced[-1, :3] - demonstrated[-1, :3])),
+        None if closed else waves(demonstrated, reproduced),
+        float(np.linalg.norm(reproduced[:, 3:] - demonstrated[:, 3:], axis=1).max()),
+    )
+
+
+def search(
+    problem: Problem,
+    method: Method,
+    tolerance: Tolerance,
+    count: int | None = None,
+    passes: int | None = None,
+) -> Weights:
+    """Learn with as few basis functions as the tolerance allows.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : {'lwr', 'ridge'}
+    tolerance : Tolerance
+    count : int, optional
+        N alone, whatever it reaches.
+    passes : int, optional
+        Of LWR; without it as few as the tolerance allows, at most `PASSES`.
+
+    Returns
+    -------
+    Weights
+        The first within the tolerance; where none is, the best found.
+    """
+    most = min(MOST, max(FIRST, _BEYOND_BAND * problem.curve.intervals))
+    best: Weights | None = None
+    number = count or FIRST
+    while True:
+        here: Weights | None = None
+        for found in problem.learn(number, method, passes):
+            if here is None or found.quality.excess(tolerance) < here.quality.excess(tolerance):
+                here = found
+            if here.quality.excess(tolerance) <= 1.0:
+                return here
+        assert here is not None
+        excess = here.quality.excess(tolerance)
+        if best is None or excess < best.quality.excess(tolerance):
+            best = here
+        if count is not None or number >= most:
+            return best
+        number = min(most, int(np.ceil(number * np.clip(1.1 * np.sqrt(excess), 1.15, 4.0))))
+
+
+def _alpha_f(rest: Floats, forced: Floats, demonstrated: Floats) -> Floats:
+    """Factor per axis that brings the forced response closest to the demonstration.
+
+    With x = x_hom + alpha x_forced: ``alpha = <x_demo - x_hom, x_forced> / <x_forced, x_forced>``;
+    1 where x_forced is negligible.
+    """
+    across, along = np.sum(rest * forced, axis=0), np.sum(forced**2, axis=0)
+    ranges = np.ptp(demonstrated, axis=0)
+    extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
+    least = np.maximum(NEGLIGIBLE * extents, ROUNDING)
+    told = along > least**2 * len(forced)
+    return np.where(told, across / np.where(told, along, 1.0), 1.0)
+
+
+def nearest(points: Floats, path: Floats) -> Floats:
+    """Distance of points (n, 3) to a densely sampled path (m, 3), shape (n,).
+
+    To the two segments beside the nearest sample: exact where samples are closer together than
+    the path is to itself.
+    """
+    from scipy.spatial import cKDTree
+
+    at = np.clip(cKDTree(path).query(points)[1], 1, len(path) - 2)
+    best = np.full(len(points), np.inf)
+    for first in (at - 1, at):
+        way = path[first + 1] - path[first]
+        size = np.maximum(np.sum(way**2, axis=1), 1e-300)
+        offset = points - path[first]
+        share = np.clip(np.sum(offset * way, axis=1) / size, 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(offset - share[:, None] * way, axis=1))
+    return best
+
+
+def waves(demonstrated: Floats, reproduced: Floats) -> tuple[float, float] | None:
+    """Mean wave heights of open strokes in chart coordinates (T, D); None for a line."""
+    v, length = demonstrated[:, 1], demonstrated[-1, 0] - demonstrated[0, 0]
+    if np.ptp(v) < LINE * abs(length):
+        return None
+    there, here = wave_heights(v).mean, wave_heights(reproduced[:, 1]).mean
+    return None if there is None else (there, here or 0.0)

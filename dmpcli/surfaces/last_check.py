@@ -1,0 +1,131 @@
+"""What every stroke on a mesh must hold before it is given out, however it was found.
+
+A strip that was walked over a step, or facets that were walked on either side of a corner, can
+come out whole and be wrong. None of these checks knows how the stroke was drawn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces.mesh import CREASE, Mesh
+from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces.vectors import dot, length
+
+# Start and goal are met within this, mm, and within the noise of the mesh there, which tilts its
+# facets; a geodesic may be so much shorter than its chord.
+MET = 1e-2
+# Samples are no farther apart than so many times their distance in the chart, and this, mm.
+_TIMES, _MORE = 3.0, 0.3
+# A foot this far from its facet is not on it, mm.
+_ON = 1e-3
+# Chart coordinates this near to those of start and goal are theirs, mm.
+_SAME = 1e-6
+_TILTED = np.cos(np.radians(CREASE))
+
+
+@dataclass(frozen=True)
+class Feet:
+    """Strokes on a mesh.
+
+    Attributes
+    ----------
+    coordinates : array, shape (B, T, 3)
+        In the charts, mm.
+    position, normal : array, shape (B, T, 3)
+        Of the points without w, mm, and unit vectors on either side.
+    face : array of int, shape (B, T)
+        Their facets.
+    stretch : array, shape (B, T)
+        Distance of neighbouring cross lines, by that at the centre line.
+    outside : array of bool, shape (B, T)
+        Points beyond the border. What comes after the first is not looked at.
+    """
+
+    coordinates: Floats
+    position: Floats
+    normal: Floats
+    face: Integers
+    stretch: Floats
+    outside: Booleans
+
+
+def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats) -> Integers:
+    """Tell which strokes are wrong, and how.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    feet : Feet
+        B strokes.
+    start, goal : array, shape (B, 3)
+        On the mesh, mm.
+    goals : array, shape (B, 3)
+        Chart coordinates of the goals, mm; starts are at 0.
+
+    Returns
+    -------
+    array of int, shape (B,)
+        `Status`: TORN, MISSED, LOST or TILTED, else DRAWN.
+    """
+    on = ~np.maximum.accumulate(feet.outside, axis=1)
+    wrong = [
+        (_torn(feet, on), Status.TORN),
+        (_missed(mesh, feet, on, start, goal, goals), Status.MISSED),
+        (_beside(mesh, feet, on), Status.LOST),
+        (_tilted(mesh, feet, on), Status.TILTED),
+    ]
+    which, what = [mark for mark, _ in wrong], [np.int64(status) for _, status in wrong]
+    return np.select(which, what, np.int64(Status.DRAWN))
+
+
+def shorter_than_chord(mesh: Mesh, start: Floats, goal: Floats, lengths: Floats) -> Booleans:
+    """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise."""
+    chord = length(goal - start)[:, 0]
+    noise = mesh.noise[mesh.search(np.stack([start, goal]).reshape(-1, 3))[1]]
+    height = 6.0 * noise.reshape(2, -1).max(axis=0)
+    smooth = np.sqrt(np.maximum(chord**2 - height**2, 0.0))
+    return np.asarray(lengths < smooth - MET)
+
+
+def _torn(feet: Feet, on: Booleans) -> Booleans:
+    move = length(np.diff(feet.position, axis=1))[..., 0]
+    change = np.diff(feet.coordinates[..., :2], axis=1)
+    stretch = np.maximum(np.abs(feet.stretch[:, 1:]), np.abs(feet.stretch[:, :-1]))
+    flat = np.hypot(change[..., 0] * stretch, change[..., 1])
+    return np.asarray(np.any((move > _TIMES * flat + _MORE) & on[:, 1:], axis=1))
+
+
+def _missed(
+    mesh: Mesh, feet: Feet, on: Booleans, start: Floats, goal: Floats, goals: Floats
+) -> Booleans:
+    missed = np.zeros(len(start), dtype=bool)
+    for at, point, of in ((0, start, 0.0 * goals), (-1, goal, goals)):
+        there = np.all(np.abs(feet.coordinates[:, at, :2] - of[:, :2]) < _SAME, axis=1)
+        off = length(feet.position[:, at] - point)[:, 0]
+        missed |= there & on[:, at] & (off > MET + mesh.noise[feet.face[:, at]])
+    return missed
+
+
+def _beside(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
+    plane = mesh.planes[feet.face]
+    off = np.einsum("bti,bti->bt", feet.position, plane[..., :3]) - plane[..., 3]
+    return np.asarray(np.any((np.abs(off) > _ON) & on, axis=1))
+
+
+def _tilted(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
+    rows, samples = np.nonzero(mesh.steep[feet.face] & on)
+    tilted = np.zeros(len(feet.face), dtype=bool)
+    if len(rows) == 0:
+        return tilted
+    position, normal = feet.position[rows, samples], feet.normal[rows, samples]
+    face = feet.face[rows, samples]
+    # A point of an edge is on either facet.
+    either = np.concatenate([face[:, None], mesh.topology.neighbours[face]], axis=1)
+    flat, corner = mesh.face_normals[either], mesh.corners[either, 0]
+    holds = np.abs(dot(normal[:, None], flat)[..., 0]) >= _TILTED
+    holds &= np.abs(dot(position[:, None] - corner, flat)[..., 0]) < _SAME
+    holds &= either >= 0
+    tilted[rows[~holds.any(axis=1)]] = True
+    return tilted

@@ -1,0 +1,46 @@
+"""A stroke without orientation, taught on a wall, drawn on planes that face either way."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from dmpcli.cli import app
+from dmpcli.records import record, streams
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def skill(tmp_path_factory):
+    """One wave on y = 0, first bulge to +z, between two lifts that tell no side: ±3 mm."""
+    folder = tmp_path_factory.mktemp("wall")
+    r = np.linspace(0.0, 1.0, 601)
+    s = 10 * r**3 - 15 * r**4 + 6 * r**5
+    y = 3.0 * (np.exp(-(((s - 0.3) / 0.02) ** 2)) - np.exp(-(((s - 0.7) / 0.02) ** 2)))
+    table = np.column_stack([6 * r, 300 * s, y, 40 * np.sin(2 * np.pi * s)])
+    np.savetxt(folder / "wall.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    assert run("fit", folder / "wall.csv", "-o", folder / "skill.json", "-q").exit_code == 0
+    return folder / "skill.json"
+
+
+@pytest.mark.parametrize("y", [-1.0, 1.0])
+def test_the_surface_decides_the_side_and_the_wave_is_not_mirrored(skill, tmp_path, y):
+    known = json.loads(skill.read_text())
+    assert known["side_guessed"]
+    plane = tmp_path / "plane.json"
+    plane.write_text(json.dumps({"point": [0, 0, 0], "normal": [0, y, 0]}))
+    out = tmp_path / "drawn.parquet"
+    ends = ("--start", 500, 0, 0, "--goal", 800, 0, 0)
+    done = run(
+        "generalize", skill, "-o", out, *ends, "--surface", plane, "--contact", 5, "--offset", 2
+    )
+    assert done.exit_code == 0, done.stderr
+    drawn = record.decode(streams.read(out))
+    _, height, z = drawn.position().T
+    assert z[np.argmax(np.abs(z[: len(z) // 2]))] > 39.0
+    np.testing.assert_allclose(height, 2.0 * y, atol=1e-9)
+    assert drawn.provenance.facts["end_heights"] == pytest.approx([2.0, 2.0])
