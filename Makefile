@@ -92,12 +92,15 @@ dist:
 
 bench: export OPENBLAS_NUM_THREADS := 1
 bench: $(VENV)/installed
-	$(BIN)/python benchmarks/fit.py
+	$(BIN)/python -m benchmarks.fit
 	$(BIN)/python benchmarks/accuracy.py
-	$(BIN)/python benchmarks/human_strokes.py
+	$(BIN)/python -m benchmarks.human_strokes
+	$(BIN)/python -m benchmarks.noise
+	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
+	$(BIN)/python -m benchmarks.taught_surfaces
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
 

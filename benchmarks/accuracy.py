@@ -12,14 +12,15 @@ from dmpcli.arrays import Floats
 from dmpcli.measures.paper import EXPERIMENTS, REPRODUCTION, Experiment
 from dmpcli.measures.wave import stroke_wave
 from dmpcli.primitives import references
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.drawing import Style, draw
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.preparation import Choices
 from dmpcli.primitives.skill import Skill
 from dmpcli.primitives.smoothing import Stroke
 
-PAPER = Choices(alpha_1=1.7, widths="power")
+UP = np.array([0.0, 0.0, 1.0])
+PAPER = Choices(alpha_1=1.7, widths="power", learning="paper")
 ROWS = {
     "modified, default, LWR": Choices(),
     "modified, default, ridge": Choices(regression="ridge"),
@@ -80,7 +81,7 @@ def main() -> None:
     stroke = reference()
     print("| noise-free stroke, mm | RMS | end | Table 1 | Table 2 | roll-out − solve_ivp |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
-    demonstrated = height(stroke.position, REPRODUCTION, np.array([0.0, 0.0, 1.0]))
+    demonstrated = height(stroke.position, REPRODUCTION, UP)
     print(f"| demonstration | | | {demonstrated:.3f} | {demonstrated:.3f} | |")
     for name, choices in ROWS.items():
         result = fit([stroke], choices)
@@ -89,7 +90,7 @@ def main() -> None:
         for experiment in EXPERIMENTS:
             pairs = Pairs(np.array([experiment.start]), np.array([experiment.goal]))
             drawn = draw(result.skill, pairs, np.array([10.0]), None, Style())[0]
-            heights.append(height(drawn.position, experiment, drawn.normal))
+            heights.append(height(drawn.position, experiment, UP))
         print(
             f"| {name} | {r.rms:.5f} | {r.end:.5f} | {heights[0]:.3f} | {heights[1]:.3f} "
             f"| {against_solve_ivp(result.skill):.1e} |"

@@ -1,60 +1,89 @@
-"""Time of a fit in process: 500 samples × 6, N = 80. ``make bench``.
+"""Time and memory of fits. ``make bench``; ``python -m benchmarks.fit long`` for the longest.
 
-Medians and minima over many runs of one process; the ratio to one ``numpy.linalg.solve`` of 80
-equations in the same run lets machines be compared.
+The reference stroke, 500 samples × 6: medians and minima over many runs of one process; the ratio
+to one ``numpy.linalg.solve`` of 80 equations in the same run lets machines be compared. Thirty
+letters by N as the tolerance asks, and N = 2000. Then whole processes on a recording of a
+million rows at 1 kHz.
 """
 
+import resource
+import subprocess
+import sys
+import tempfile
 import time
+import tracemalloc
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
 
 from dmpcli import rotations
+from dmpcli.arrays import Floats
 from dmpcli.measures.paper import REPRODUCTION
-from dmpcli.primitives import references, regression
+from dmpcli.primitives import references
+from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.phase import even_in_time, phase
-from dmpcli.primitives.preparation import Choices, prepare
+from dmpcli.primitives.preprocessing import preprocess
+from dmpcli.primitives.regression import BandedRegression
 from dmpcli.primitives.smoothing import Stroke
+from tests import cases
 
 RUNS = 200
+ROWS = 1_000_000
 
 
-def milliseconds(task: Callable[[], object]) -> tuple[float, float]:
-    """Return the median and the minimum of `RUNS` runs after ten warm ones, ms."""
-    for _ in range(10):
+def milliseconds(task: Callable[[], object], runs: int = RUNS) -> tuple[float, float]:
+    """Return the median and the minimum of so many runs after some warm ones, ms."""
+    for _ in range(min(10, runs)):
         task()
     times = []
-    for _ in range(RUNS):
+    for _ in range(runs):
         begin = time.perf_counter()
         task()
         times.append(1e3 * (time.perf_counter() - begin))
     return float(np.median(times)), min(times)
 
 
-def main() -> None:
-    """Print a Markdown table."""
+def reference() -> Stroke:
+    """Return the paper's stroke with a turning tool, 500 samples."""
     t = np.linspace(0.0, 10.0, 500)
     angles = np.stack([np.pi + 0.1 * np.sin(t), 0.1 * np.cos(t) - 0.1, 0.05 * t], axis=1)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
     position = references.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
-    stroke = Stroke(t, position, rotations.from_euler(angles))
+    return Stroke(t, position, rotations.from_euler(angles))
 
+
+def letters() -> Stroke:
+    """Return thirty cursive letters."""
+    table = cases.letters()
+    return Stroke(table[:, 0], table[:, 1:4])
+
+
+def short() -> None:
+    """Print a Markdown table of the reference stroke."""
+    stroke = reference()
+    s = phase(np.linspace(0.0, 10.0, 641), 5.0, 1.0)
     basis = even_in_time(80, 10.0, 5.0, 1.0)
-    s = phase(t, 5.0, 1.0)
-    forcing = np.random.default_rng(0).normal(size=(500, 6))
+    forcing = np.random.default_rng(0).normal(size=(641, 6))
     square = np.random.default_rng(1).normal(size=(80, 80)) + 80 * np.eye(80)
     skill = fit([stroke], Choices()).skill
+    t = np.linspace(0.0, skill.duration, 500)
+    paper = Choices(alpha_1=1.7, widths="power", learning="paper")
     rows: dict[str, Callable[[], object]] = {
         "numpy.linalg.solve, 80 × 80, 6 right sides": lambda: np.linalg.solve(
             square, square[:, :6]
         ),
-        "regression, LWR": lambda: regression.lwr(basis, s, s, forcing),
-        "regression, ridge": lambda: regression.ridge(basis, s, s, forcing),
-        "smoothing, chart, derivatives": lambda: prepare(stroke, Choices()),
+        "parts of the recording, noise, spline": lambda: preprocess(stroke),
+        "regression, LWR": lambda: BandedRegression(basis, s).fit("lwr", forcing),
+        "regression, ridge": lambda: BandedRegression(basis, s).fit("ridge", forcing),
         "response of eq. (9)-(11), 500 samples": lambda: skill.response(t),
         "whole fit, LWR": lambda: fit([stroke], Choices()),
         "whole fit, ridge": lambda: fit([stroke], Choices(regression="ridge")),
+        "whole fit, preset paper": lambda: fit([stroke], paper),
     }
     print("| 500 samples × 6, N = 80 | median ms | least ms | × solve |")
     print("| --- | ---: | ---: | ---: |")
@@ -62,7 +91,89 @@ def main() -> None:
     for i, (name, task) in enumerate(rows.items()):
         median, least = milliseconds(task)
         unit = median if i == 0 else unit
-        print(f"| {name} | {median:.2f} | {least:.2f} | {median / unit:.1f} |")
+        print(f"| {name} | {median:.2f} | {least:.2f} | {median / unit:.1f} |", flush=True)
+
+
+def many() -> None:
+    """Print a Markdown table of fits with many functions."""
+    stroke = letters()
+    print("\n| thirty letters, 3001 samples | N | passes | RMS, mm | least ms | peak, MiB |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    for name, choices in {
+        "--basis auto": Choices(),
+        "--basis auto --regression ridge": Choices(regression="ridge"),
+        "--basis 2000": Choices(basis=2000),
+        "--basis 2000 --regression ridge": Choices(basis=2000, regression="ridge"),
+    }.items():
+        _, least = milliseconds(lambda c=choices: fit([stroke], c), 3)  # type: ignore[misc]
+        tracemalloc.start()
+        result = fit([stroke], choices)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        print(
+            f"| {name} | {len(result.skill.basis)} | {result.skill.passes} "
+            f"| {result.reproductions[0].rms:.4f} | {least:.0f} | {peak / 2**20:.0f} |",
+            flush=True,
+        )
+
+
+def recording(rows: int) -> tuple[Floats, list[str]]:
+    """Columns of 150 loops with 0.05 mm of noise and a tool that turns, 1 kHz."""
+    t = np.arange(rows) / 1000.0
+    a = 2.0 * np.pi * 150.0 * t / t[-1]
+    position = np.column_stack([1500 * t / t[-1] + 6 * np.sin(a), 20 * np.cos(a), 0 * t])
+    position += np.random.default_rng(1).normal(0.0, 0.05, position.shape)
+    half = 0.1 * np.sin(a)
+    quaternion = np.column_stack([np.cos(half), np.sin(half), 0 * t, 0 * t])
+    return np.column_stack([t, position, quaternion]), ["t", *"xyz", "qx", "qy", "qz", "qw"]
+
+
+def long() -> None:
+    """Print a Markdown table of whole processes: time of the clock, of the processor, memory."""
+    values, names = recording(ROWS)
+    print(f"\n| `dmpcli fit`, {ROWS} rows at 1 kHz | clock, s | processor, s | peak, MiB | |")
+    print("| --- | ---: | ---: | ---: | --- |")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for columns in (4, 8):
+            table = pa.table(dict(zip(names[:columns], values.T, strict=False)))
+            pq.write_table(table, folder / "long.parquet")
+            pyarrow.csv.write_csv(table, folder / "long.csv")
+            for kind in ("parquet", "csv"):
+                words = ["fit", f"long.{kind}", "-o", "skill.json"]
+                print(f"| {kind}, {columns} columns | {_process(words, folder)} |", flush=True)
+
+
+def _process(words: list[str], folder: Path) -> str:
+    """Return cells of one run of the installed command."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begin = time.perf_counter()
+    dmpcli = Path(sys.executable).with_name("dmpcli")
+    # Of its own the child knows its largest size; ours would count all children together.
+    program = (
+        "import resource, subprocess, sys; done = subprocess.run(sys.argv[1:]); "
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss); sys.exit(done.returncode)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(dmpcli), *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    clock = time.perf_counter() - begin
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    said = next(line for line in done.stderr.splitlines() if "N = " in line)
+    return f"{clock:.1f} | {spent:.1f} | {int(done.stdout) / 2**10:.0f} | {said.split(', ')[1]}"
+
+
+def main() -> None:
+    """Print all tables."""
+    if sys.argv[1:] != ["long"]:
+        short()
+        many()
+    long()
 
 
 if __name__ == "__main__":
