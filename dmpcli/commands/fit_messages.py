@@ -234,6 +234,12 @@ def _of_tolerance(result: "Fit") -> Iterator[str]:
     reached = result.skill.reached
     if reached is None or reached.within:
         return
+    if result.lost > reached.tolerance:
+        yield (
+            f"smoothing took off much of the stroke, RMS {result.lost:.3g} mm beyond its noise; "
+            "raise --cutoff, or leave it out"
+        )
+        return
     wave = next((r.wave for r in result.reproductions if r.wave is not None), None)
     heights = "" if wave is None else f", wave {wave[1]:.2f} mm of {wave[0]:.2f}"
     remedy = "ask for a --tolerance that will do"

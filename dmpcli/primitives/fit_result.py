@@ -54,6 +54,8 @@ class Fit:
         How several demonstrations were laid upon each other.
     alternative : tuple of (int, float), or None
         Where LWR misses the tolerance: N and RMS, mm, that ridge regression reaches.
+    lost : float
+        RMS that smoothing took off the recordings beyond their noise, mm.
     """
 
     skill: Skill
@@ -62,3 +64,4 @@ class Fit:
     plane: StrokePlane | None = None
     alignment: Alignment | None = None
     alternative: tuple[int, float] | None = None
+    lost: float = 0.0

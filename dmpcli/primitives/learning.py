@@ -97,8 +97,8 @@ def fit(
     learned = search(problem, method, tolerance, choices.basis, choices.passes)
     quality = with_lost(learned.quality, lost)
     within = bool(quality.excess(tolerance) <= 1.0)
-    alternative = None
-    if not within and method == "lwr" and choices.basis is None:
+    alternative, most_lost = None, max(loss[0] for loss in lost)
+    if not within and method == "lwr" and choices.basis is None and most_lost < tolerance.length:
         ridge = search(problem, "ridge", tolerance)
         alternative = (len(ridge.basis), with_lost(ridge.quality, lost).rms)
     noise = max(p.sigma for p in seen)
@@ -119,7 +119,7 @@ def fit(
             _own_reproduction(skill, curve, loss) for curve, loss in zip(curves, lost, strict=True)
         ]
     prepared = [_prepared(d, closed) for d in found]
-    return Fit(skill, prepared, reproductions, planes, alignment, alternative)
+    return Fit(skill, prepared, reproductions, planes, alignment, alternative, most_lost)
 
 
 def _check_paper(choices: Choices, surface: Surface | None) -> None:

@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from dmpcli.arrays import Floats, Integers
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 # exp(-60) is 1e-26: ten orders below rounding, and weights differ by far less than that.
 _LEAST_EXPONENT = -60.0
@@ -174,21 +172,20 @@ class Window:
         return Window(self.first, self.psi * factor[:, None], self.count)
 
     def mean(self, weights: Floats) -> Floats:
-        """Product with weights (D, N): shape (S, D)."""
-        return np.asarray(self._matrix @ weights.T)
+        """Product with weights (D, N): shape (S, D); by numpy, since roll-outs load no scipy."""
+        by_function = np.ascontiguousarray(weights.T)
+        runs = sliding_window_view(by_function, self.psi.shape[1], axis=0)[self.first]
+        return np.asarray(np.einsum("sw,sdw->sd", self.psi, runs))
 
     def gathered(self, values: Floats) -> Floats:
         """Product of the transpose with values (S, D): shape (N, D)."""
-        return np.asarray(self._matrix.T @ values)
-
-    @cached_property
-    def _matrix(self) -> "csr_array":
         from scipy.sparse import csr_array
 
         samples, width = self.psi.shape
         columns = (self.first[:, None] + np.arange(width)).ravel()
         ends = np.arange(0, samples * width + 1, width)
-        return csr_array((self.psi.ravel(), columns, ends), shape=(samples, self.count))
+        matrix = csr_array((self.psi.ravel(), columns, ends), shape=(samples, self.count))
+        return np.asarray(matrix.T @ values)
 
     def normal(self) -> Floats:
         """Product of the transpose with itself in LAPACK's band form, shape (2 W - 1, N)."""
