@@ -12,11 +12,12 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.measures.wave import LINE, wave_heights
-from dmpcli.primitives import dynamics, end_conditions
+from dmpcli.primitives import end_conditions
 from dmpcli.primitives.curve import Curve
 from dmpcli.primitives.dynamics import Spring
-from dmpcli.primitives.phase import Basis, WidthRule, even_in_time, phase
-from dmpcli.primitives.regression import BandedRegression, Method, target_forcing
+from dmpcli.primitives.forced_model import forced_model
+from dmpcli.primitives.phase import Basis, WidthRule
+from dmpcli.primitives.regression import Method, target_forcing
 
 FIRST = 80
 MOST = 2000
@@ -25,9 +26,6 @@ PASSES = 3
 LARGEST = 4.0
 # Deviation of the tool's orientation that is always allowed, rad.
 ANGLE = np.radians(0.1)
-# Samples for each basis function, and the fewest in all.
-_SAMPLES = 8
-_FEWEST = 640
 # N may be so many times the pieces that the recording's band holds.
 _BEYOND_BAND = 16
 # A forced response below this part of the extent does not tell alpha_f.
@@ -121,6 +119,7 @@ class Problem:
     curve : Curve
         The mean demonstration in the skill's six coordinates.
     spring : Spring
+        Alike on all axes.
     alpha_1 : float
     widths : {'spacing', 'power'}
     closed : bool
@@ -145,35 +144,29 @@ class Problem:
             So many alone; None tries 1, 2, ... `PASSES` as they are asked for.
         """
         spring, duration = self.spring, self.curve.duration
-        samples = max(_SAMPLES * (count - 1), _FEWEST) + 1
-        t = np.linspace(0.0, duration, samples)
-        s = phase(t, spring.tau, self.alpha_1)
-        basis = even_in_time(count, duration, spring.tau, self.alpha_1, self.widths)
-        regression = BandedRegression(basis, s)
-        target = self.curve.limited(count)
-        start, goal = self.curve(t[[0, -1]])
-        x, velocity = target(t), target(t, 1)
-        forcing = target_forcing(spring, goal, x, velocity, target(t, 2))
+        k, d = float(spring.k[0]), float(spring.d[0])
+        model = forced_model(count, k, d, spring.tau / duration, self.alpha_1, self.widths)
+        regression = model.regression
+        start, goal = self.curve(np.array([0.0, duration]))
+        x, velocity, acceleration = self.curve.limited(count, model.samples)
+        forcing = target_forcing(spring, goal, x, velocity, acceleration)
         V0, V_end = spring.tau * velocity[0], spring.tau * velocity[-1]
-        a, b, c = dynamics.homogeneous(spring, t)
-        rest = start * a + goal * b + V0 * c
-        demonstrated = self.curve(t)
-        single = Spring(spring.k[:1], spring.d[:1], spring.tau)
-        C = end_conditions.end_responses(single, basis, self.alpha_1, duration)
+        rest = start * model.a + goal * model.b + V0 * model.c
+        demonstrated = self.curve.even(model.samples)
+        C = model.end_responses
         moves = regression.least_change(method, C)
-        E = dynamics.transition(spring, np.array(duration))
+        E = model.end
         required = np.stack(
             [
-                (goal - start) * E[:, 0, 0] - V0 * E[:, 0, 1],
-                V_end - (start - goal) * E[:, 1, 0] - V0 * E[:, 1, 1],
+                (goal - start) * E[0, 0] - V0 * E[0, 1],
+                V_end - (start - goal) * E[1, 0] - V0 * E[1, 1],
             ],
             axis=1,
         )
         rounds = (passes,) if passes else (1,) if method == "ridge" else range(1, PASSES + 1)
         for number in rounds:
             weights = regression.fit(method, forcing, number)
-            both = np.concatenate([weights, moves.T])
-            response = self._forced(basis, both, t)
+            response = model.response(np.concatenate([weights, moves.T]))
             forced, moved = response[:, :6], response[:, 6:]
             alpha_f = _alpha_f(demonstrated - rest, forced, demonstrated)
             if count > 1:
@@ -181,21 +174,9 @@ class Problem:
                 weights, forced = weights + m @ moves.T, forced + moved @ m.T
             reproduced = rest + alpha_f * forced
             quality = judged(demonstrated, reproduced, self.closed)
-            yield Weights(basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality)
-
-    def _forced(self, basis: Basis, weights: Floats, t: Floats) -> Floats:
-        """Response to the forcing terms of weights (D, N), shape (T, D)."""
-        ones = np.ones(len(weights))
-        spring = Spring(self.spring.k[0] * ones, self.spring.d[0] * ones, self.spring.tau)
-
-        def forcing(at: Floats) -> Floats:
-            s = phase(at, spring.tau, self.alpha_1)
-            f = basis.mean(s, weights)
-            f *= s[..., None]
-            return f
-
-        step = dynamics.longest_step(spring, self.curve.duration, len(basis))
-        return dynamics.forced(spring, forcing, t, step)
+            yield Weights(
+                model.basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality
+            )
 
 
 def judged(demonstrated: Floats, reproduced: Floats, closed: bool) -> Quality:
@@ -275,7 +256,9 @@ def nearest(points: Floats, path: Floats) -> Floats:
     """
     from scipy.spatial import cKDTree
 
-    at = np.clip(cKDTree(path).query(points)[1], 1, len(path) - 2)
+    # The tree serves one query: balancing it costs more than it saves.
+    tree = cKDTree(path, compact_nodes=False, balanced_tree=False)
+    at = np.clip(tree.query(points)[1], 1, len(path) - 2)
     best = np.full(len(points), np.inf)
     for first in (at - 1, at):
         way = path[first + 1] - path[first]

@@ -13,6 +13,7 @@ Gauss-Legendre quadrature of the forcing, which leaves rounding error only.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -105,6 +106,13 @@ def homogeneous(spring: Spring, t: Floats) -> tuple[Floats, Floats, Floats]:
     return a, 1.0 - a, c
 
 
+@cache
+def quadrature(nodes: int) -> tuple[Floats, Floats]:
+    """Return nodes and weights (n,) of the Gauss-Legendre quadrature over [0, 1]."""
+    at, weights = np.polynomial.legendre.leggauss(nodes)
+    return 0.5 * (at + 1.0), 0.5 * weights
+
+
 def longest_step(spring: Spring, duration: float, count: int) -> float:
     """Step that the quadrature of a forcing term of N functions can take, s.
 
@@ -142,8 +150,7 @@ def forced(
     fractions = np.arange(pieces) / pieces
     starts = (t[:-1, None] + intervals[:, None] * fractions).ravel()
     h = np.repeat(intervals / pieces, pieces)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+    nodes, weights = quadrature(NODES)
     f = forcing(starts[:, None] + h[:, None] * nodes)
     if len(h) and np.ptp(h) <= _EVEN * np.max(h):
         h = h[:1]  # one matrix serves all steps
@@ -151,19 +158,26 @@ def forced(
     weighted = f * (weights * h[:, None])[..., None]
     increments = np.sum(kernel * weighted[..., None], axis=1)
 
-    states = _accumulate(transition(spring, h), increments)
+    states = accumulated(transition(spring, h), increments)
     response = np.zeros((len(t), len(spring.k)))
     response[1:] = states[pieces - 1 :: pieces, :, 0]
     return response
 
 
-def _accumulate(E: Floats, z: Floats) -> Floats:
+def accumulated(E: Floats, z: Floats) -> Floats:
     """States ``z_n <- E_n z_(n-1) + z_n``, all at once: a parallel prefix of affine maps.
 
     Parameters
     ----------
     E : array, shape (n, D, 2, 2), or (1, D, 2, 2) where all steps are alike
+        Matrix exponential of each step; one axis may stand for all.
     z : array, shape (n, D, 2)
+        What the forcing adds to (x, V) in each step.
+
+    Returns
+    -------
+    array, shape (n, D, 2)
+        State after each step, at rest in 0 before the first.
     """
     E, z = E.copy(), z.copy()
     stride = 1

@@ -8,7 +8,7 @@ stroke right has a closed form: two conditions per axis.
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.primitives.dynamics import NODES, Spring, longest_step, transition
+from dmpcli.primitives.dynamics import NODES, Spring, longest_step, quadrature, transition
 from dmpcli.primitives.phase import Basis, phase
 
 
@@ -33,11 +33,11 @@ def end_responses(spring: Spring, basis: Basis, alpha_1: float, duration: float)
     """
     steps = int(np.ceil(duration / longest_step(spring, duration, len(basis)) - 1e-9))
     h = duration / steps
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    t = ((np.arange(steps)[:, None] + 0.5 * (nodes + 1.0)) * h).ravel()
+    nodes, weights = quadrature(NODES)
+    t = ((np.arange(steps)[:, None] + nodes) * h).ravel()
     s = phase(t, spring.tau, alpha_1)
     E = transition(spring, duration - t)[:, 0, :, 1]
-    kernel = E * (np.tile(0.5 * weights, steps) * h / spring.tau)[:, None]
+    kernel = E * (np.tile(weights, steps) * h / spring.tau)[:, None]
     return np.ascontiguousarray(basis.window(s).normalized().scaled(s).gathered(kernel).T)
 
 

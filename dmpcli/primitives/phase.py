@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from dmpcli.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # exp(-60) is 1e-26: ten orders below rounding, and weights differ by far less than that.
 _LEAST_EXPONENT = -60.0
@@ -179,13 +182,16 @@ class Window:
 
     def gathered(self, values: Floats) -> Floats:
         """Product of the transpose with values (S, D): shape (N, D)."""
+        return np.asarray(self.sparse().T @ values)
+
+    def sparse(self) -> "csr_array":
+        """Return the matrix (S, N) in scipy's form."""
         from scipy.sparse import csr_array
 
         samples, width = self.psi.shape
         columns = (self.first[:, None] + np.arange(width)).ravel()
         ends = np.arange(0, samples * width + 1, width)
-        matrix = csr_array((self.psi.ravel(), columns, ends), shape=(samples, self.count))
-        return np.asarray(matrix.T @ values)
+        return csr_array((self.psi.ravel(), columns, ends), shape=(samples, self.count))
 
     def normal(self) -> Floats:
         """Product of the transpose with itself in LAPACK's band form, shape (2 W - 1, N)."""

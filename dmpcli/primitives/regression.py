@@ -1,5 +1,6 @@
 """Weights of the forcing term from its samples."""
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -144,12 +145,19 @@ class BandedRegression:
             return self._solve(np.ascontiguousarray(constraint.T))
         return constraint.T / self._local_cost
 
-    def _solve(self, right: Floats) -> Floats:
-        from scipy.linalg import solve_banded
-
+    @cached_property
+    def _normal(self) -> Floats:
+        """The normal equations with their slight ridge, in LAPACK's band form."""
         normal = self._features.normal()
         reach = len(normal) // 2
         normal[reach] += _RIDGE * normal[reach].mean()
+        return normal
+
+    def _solve(self, right: Floats) -> Floats:
+        from scipy.linalg import solve_banded
+
+        normal = self._normal
+        reach = len(normal) // 2
         return np.asarray(solve_banded((reach, reach), normal, right, check_finite=False))
 
 

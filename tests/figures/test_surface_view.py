@@ -104,6 +104,7 @@ def test_a_run_of_a_curved_stroke_is_measured_along_the_surface(ground):
     assert placed([drawn], ground, None)[0].wave.mean == pytest.approx(50.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_strokes_beside_the_mesh_say_why_they_have_no_wave_height(ground):
     V, F = ground.V, ground.F
     near = np.abs(V[F].mean(axis=1)[:, 1] + 40.0) < 15.0

@@ -1,4 +1,7 @@
-"""Real human handwriting: all 210 strokes of the LASA set must fit and generalize."""
+"""Real human handwriting: strokes of the LASA set must fit and generalize.
+
+Each regression and each test takes strokes of its own; `benchmarks.human_strokes` takes all 210.
+"""
 
 import numpy as np
 import pytest
@@ -22,9 +25,13 @@ def draw_at(skill, start, goal, duration=None):
 
 
 @pytest.mark.parametrize("shape", shapes())
-@pytest.mark.parametrize(("regression", "percent"), [("lwr", 0.12), ("ridge", 0.03)])
-def test_reproduction_stays_within_the_promised_share_of_the_diagonal(shape, regression, percent):
-    for stroke in strokes(shape):
+@pytest.mark.parametrize(
+    ("regression", "percent", "which"), [("lwr", 0.12, (0, 5)), ("ridge", 0.03, (1,))]
+)
+def test_reproduction_stays_within_the_promised_share_of_the_diagonal(
+    shape, regression, percent, which
+):
+    for stroke in (strokes(shape)[i] for i in which):
         result = fit([stroke], Choices(regression=regression, trim=False))
         reproduced = result.reproductions[0].reproduced @ result.skill.frame.axes.T
         reproduced += result.skill.frame.start
@@ -36,7 +43,7 @@ def test_reproduction_stays_within_the_promised_share_of_the_diagonal(shape, reg
 
 @pytest.mark.parametrize("shape", shapes())
 def test_new_pairs_keep_the_shape(shape):
-    for stroke in strokes(shape):
+    for stroke in (strokes(shape)[i] for i in (2, 6)):
         skill = fit([stroke], Choices()).skill
         size = extent(stroke.position)
         angle, length = 1.2, skill.frame.length
@@ -80,7 +87,7 @@ def test_the_set_holds_what_the_promise_is_about():
 @pytest.mark.parametrize("shape", shapes())
 def test_strokes_that_end_where_they_began_keep_their_shape_and_reach_their_goal(shape):
     """Each stroke and its way back: closed, and beyond its own ends."""
-    for stroke in strokes(shape)[:3]:
+    for stroke in (strokes(shape)[i] for i in (3, 4)):
         back = stroke.position[-2::-1]
         there_and_back = Stroke(
             np.linspace(0.0, 2.0 * stroke.duration, 2 * len(stroke.t) - 1),
