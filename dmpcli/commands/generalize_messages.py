@@ -70,10 +70,13 @@ def tell_of_surface(
     from dmpcli.commands.messages import tell, warn
     from dmpcli.primitives.drawing import turned_over
 
-    start = table.pairs[table.good.nonzero()[0]].start
+    pairs = table.pairs[table.good.nonzero()[0]]
+    start = pairs.start
     if skill.side_guessed:
-        _tell_of_side(skill, given, start, name, quiet)
-    over = turned_over(skill, table.pairs[table.good.nonzero()[0]], given)
+        _tell_of_guessed_side(skill, given, start, name, quiet)
+    elif pairs.start_rotation is None:
+        _tell_of_taught_side(skill, given, start, name, quiet)
+    over = turned_over(skill, pairs, given)
     for heights, seen in ((style.heights, not over.all()), (style.heights_over, over.any())):
         if heights is None or not seen or heights.deep:
             continue
@@ -98,7 +101,7 @@ def tell_of_surface(
             )
 
 
-def _tell_of_side(
+def _tell_of_guessed_side(
     skill: "Skill", given: "Surface", start: "Floats", name: str, quiet: bool
 ) -> None:
     import numpy as np
@@ -119,6 +122,38 @@ def _tell_of_side(
         tell(
             f"{name}: the stroke was taught without orientation; it is seen from this surface's "
             "side",
+            quiet,
+        )
+
+
+def _tell_of_taught_side(
+    skill: "Skill", given: "Surface", start: "Floats", name: str, quiet: bool
+) -> None:
+    """Say where a curved surface is not decidedly, or not by its own normals, on the taught side.
+
+    A part's own normals point out of it; those of an open sheet mean nothing.
+    """
+    import numpy as np
+
+    from dmpcli.commands.messages import tell, warn
+    from dmpcli.primitives.drawing import taught_side
+    from dmpcli.surfaces.plane import Plane
+
+    side = None if isinstance(given, Plane) else taught_side(skill, given, start)
+    if side is None or not len(start):
+        return
+    cosine = np.sum(given.closest(start).normal * side, axis=-1)
+    if (np.abs(cosine) < np.sin(np.radians(_UNDECIDED))).any():
+        warn(
+            f"{name}: the surface stands square to the one that the stroke was taught on, so that "
+            "it may come out mirrored or on the other side; give the tool at the start, "
+            "--start X Y Z RX RY RZ"
+        )
+    elif (cosine < 0.0).any():
+        tell(
+            f"{name}: drawn on the side that the surface's own normals point away from, as the "
+            "tool was when it was taught; for the other one give the tool at the start, "
+            "--start X Y Z RX RY RZ",
             quiet,
         )
 

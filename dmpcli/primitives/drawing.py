@@ -337,16 +337,17 @@ def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None, turn: float =
     elif pairs.start_rotation is not None:
         side = -pairs.start_rotation[..., 2]
     else:
-        side = _taught_side(skill, surface, pairs.start)
+        side = taught_side(skill, surface, pairs.start)
     return surface.charts(pairs.start, pairs.goal, side, closed)
 
 
-def _taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None:
+def taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None:
     """Vectors to the side that a skill was taught on, at starts (B, 3) or everywhere (3,).
 
-    The way its tool pointed; but on the very surface that it was taught on, that surface's side:
-    about a cylinder, or on the other face of a part, the tool's direction at the taught start may
-    point out of the material.
+    The way its tool pointed, or without orientation the normal where it was taught; but on the very
+    surface that it was taught on, that surface's side: about a cylinder, or on the other face of a
+    part, the tool's direction at the taught start may point out of the material. None where the
+    skill does not know its side.
     """
     if skill.surface is not None:
         taught = surface.closest(skill.frame.start[None])
@@ -354,7 +355,9 @@ def _taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None
         if taught.distance[0] < _SAME_PLACE and abs(along) > _SAME_NORMAL:
             return np.asarray(np.sign(along) * surface.closest(start).normal)
     R = skill.frame.rotation
-    return None if R is None else -R[:, 2]
+    if R is not None:
+        return -R[:, 2]
+    return None if skill.surface is None else skill.frame.normal
 
 
 def _about_normal(turn: float) -> Floats:

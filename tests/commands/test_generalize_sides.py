@@ -8,6 +8,8 @@ from typer.testing import CliRunner
 
 from dmpcli.cli import app
 from dmpcli.records import record, streams
+from tests.commands.test_generalize import write_skill
+from tests.primitives.strokes import paper_stroke
 
 
 def run(*arguments):
@@ -44,3 +46,29 @@ def test_the_surface_decides_the_side_and_the_wave_is_not_mirrored(skill, tmp_pa
     assert z[np.argmax(np.abs(z[: len(z) // 2]))] > 39.0
     np.testing.assert_allclose(height, 2.0 * y, atol=1e-9)
     assert drawn.provenance.facts["end_heights"] == pytest.approx([2.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("angle", "word"),
+    [(0.3, None), (np.pi / 2, "warning"), (np.pi - 0.3, "away from")],
+    ids=["above", "square", "below"],
+)
+def test_where_the_taught_side_is_not_decided_or_not_the_surfaces_own_it_is_told(
+    tmp_path, angle, word
+):
+    """A tool that pointed down draws about a cylinder: outside, square to it, inside."""
+    learned = write_skill(tmp_path / "s.json", paper_stroke(turning=True))
+    tube = tmp_path / "cylinder.json"
+    tube.write_text(json.dumps({"point": [0, 0, 0], "axis": [0, 1, 0], "radius": 80.0}))
+    foot = 80.0 * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    start, goal = foot - [0.0, 50.0, 0.0], foot + [0.0, 50.0, 0.0]
+    ends = ("--start", *start, "--goal", *goal)
+    out = tmp_path / "drawn.parquet"
+    done = run("generalize", learned, "-o", out, *ends, "--surface", tube)
+    assert done.exit_code == 0, done.stderr
+    assert ("mirrored" in done.stderr) == (word == "warning")
+    assert ("normals point away from" in done.stderr) == (word == "away from")
+    assert ("--start X Y Z RX RY RZ" in done.stderr) == (word is not None)
+    if word != "warning":
+        drawn = record.decode(streams.read(out))
+        assert drawn.columns["nz"][0] > 0.9  # to where the tool came from
