@@ -67,19 +67,17 @@ lint: $(VENV)/installed
 
 # The lock files, each for every Python from 3.11 on; UPGRADE=--upgrade takes the newest versions.
 
-UV := $(OUT)/lock/bin/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
+DIST := $(OUT)/dist
+UV   := $(DIST)/tools/bin/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
     --no-annotate --custom-compile-command "make lock"
 
 lock:
-	$(PYTHON) -m venv $(OUT)/lock
-	$(OUT)/lock/bin/python -m pip install --quiet --disable-pip-version-check uv==0.13.9
+	@sh tools/set_up.sh "$(PYTHON)" "$(DIST)/tools" requirements-dist.lock "$(OUT)" bare
 	$(UV) pyproject.toml --extra test -o requirements.lock $(UPGRADE)
 	$(UV) pyproject.toml --extra test -o requirements-lowest.lock --resolution lowest-direct --upgrade
 	$(UV) --group dist -o requirements-dist.lock $(UPGRADE)
 
 # What is handed out: built from one another, checked, and the wheel tried without extras.
-
-DIST := $(OUT)/dist
 
 dist:
 	@sh tools/set_up.sh "$(PYTHON)" "$(DIST)/tools" requirements-dist.lock "$(OUT)" bare
