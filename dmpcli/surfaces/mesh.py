@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # Where facets meet at more than this the edge is meant to be sharp: normals are not smoothed
 # across it, and a strip whose normal turns as much within one step is unfolded instead, degrees.
 CREASE = 25.0
+# At the tip of a cone the normal leans off each facet by more than this, degrees, and so many times
+# the angle between facets.
+_LEANING, _TIMES = 5.0, 2.0
 # A point beside the border by less than this is on it, mm.
 ON_BORDER = 1e-2
 # However fine the mesh, points this near to it can be of the same surface, mm.
@@ -99,7 +102,18 @@ class Mesh:
             joined &= ~self._ends(apart)
             over = noisy[:, None] | joined[self.F]
             normals = np.where(over[..., None], among[self.F], normals)
-        return unit(normals)
+        normals = unit(normals)
+        flat = self.face_normals[:, None]
+        return np.where(self._tips(normals)[..., None], flat, normals)
+
+    def _tips(self, normals: Floats) -> Booleans:
+        """Corners (m, 3) whose normals are not those of the facets about them: the tips of cones.
+
+        About a smooth point a normal leans off a facet by about the angle between facets there.
+        """
+        lean = np.degrees(np.arccos(np.clip(dot(normals, self.face_normals[:, None])[..., 0], -1, 1)))
+        bent = np.maximum(self.dihedrals, np.roll(self.dihedrals, 1, axis=1))
+        return (lean > _LEANING + _TIMES * bent) & (self.noise == 0.0)[:, None]
 
     def _ends(self, edges: Booleans) -> Booleans:
         """Vertices, shape (n,), at the ends of edges marked (m, 3)."""
