@@ -23,8 +23,8 @@ _LENGTHS = (1.1, 2.0, 4.5)
 _ALONG_EDGES = 1.01
 # A point is nudged into its facet by this part of the way to the middle, so that it is on no edge.
 _INTO = 1e-7
-# Windows narrower than this, rad, hold no line that could be told from those beside it; goals beside
-# a window by no more count as in it.
+# Windows narrower than this, rad, hold no line that could be told from those beside it; goals
+# beside a window by no more count as in it.
 _NARROW = 1e-9
 # So many windows of one pair, and the search gives up.
 _MOST = 400_000
@@ -206,15 +206,13 @@ def _behind(mesh: Mesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> _Win
     to = _unit(c)
     # c may stand to the right of what is seen, to its left, or in it.
     from_right, from_left = _cross(windows.right, to), _cross(to, windows.left)
-    right_of = (from_right > 0.0)[:, None]
-    left_of = (from_left > 0.0)[:, None]
+    right_of, left_of = (from_right > 0.0)[:, None], (from_left > 0.0)[:, None]
+    right = np.where(right_of, to, windows.right)
+    left = np.where(left_of, to, windows.left)
     pair, face, edge = windows.pair, windows.face, windows.edge
-    near = _Windows(
-        pair, face, (edge + 1) % 3, windows.a, c, windows.right, np.where(left_of, to, windows.left)
-    ).rows(right_of[:, 0])
-    beyond = _Windows(
-        pair, face, (edge + 2) % 3, c, windows.b, np.where(right_of, to, windows.right), windows.left
-    ).rows(left_of[:, 0])
+    near = _Windows(pair, face, (edge + 1) % 3, windows.a, c, windows.right, left)
+    beyond = _Windows(pair, face, (edge + 2) % 3, c, windows.b, right, windows.left)
+    near, beyond = near.rows(right_of[:, 0]), beyond.rows(left_of[:, 0])
     both = (
         np.concatenate([getattr(near, field.name), getattr(beyond, field.name)])
         for field in fields(_Windows)

@@ -17,6 +17,8 @@ from dmpcli.surfaces.walked import closed_direction, goal_coordinates, walk_samp
 COINCIDENT = 1e-6
 # A stroke that is walked over a crease is followed this much at a time to see whether it folds, mm.
 _LEAST_MOVE = 1e-3
+# It folds where it comes back by more than this, mm.
+_OVERLAP = 0.3
 # Points beside the border by more than this, mm, and by more than this part of their distance to
 # the mesh, are surely not over it.
 _BESIDE, _LEANING = 1.0, 0.2
@@ -237,14 +239,20 @@ class MeshCharts:
 
 
 def _folded(foot: Floats, axes: Floats, coordinates: Floats) -> Booleans:
-    """Tell which strokes (R, T, 3) move backwards along e_u while u goes on, shape (R,)."""
+    """Tell which strokes (R, T, 3) come back along e_u while u goes on, shape (R,).
+
+    By more than `_OVERLAP` in all: beyond each corner of a faceted rim a little of the surface is
+    come over twice, and the lines go on after it.
+    """
     move, change = np.diff(foot, axis=1), np.diff(coordinates, axis=1)
     along = 0.5 * (dot(move, axes[:, :-1, :, 0])[..., 0] + dot(move, axes[:, 1:, :, 0])[..., 0])
     du, dv = change[..., 0], change[..., 1]
     clear = (np.abs(du) > _LEAST_MOVE) & (np.abs(du) > 0.2 * np.abs(dv))
     # The chord over a crease is in neither facet.
     clear &= dot(axes[:, :-1, :, 2], axes[:, 1:, :, 2])[..., 0] > _FLAT
-    return np.asarray(np.any(clear & (along * du < 0.0), axis=1))
+    gone = np.cumsum(np.where(clear, along * np.sign(du), 0.0), axis=1)
+    back = np.maximum.accumulate(np.maximum(gone, 0.0), axis=1) - gone
+    return np.asarray(np.any(back > _OVERLAP, axis=1))
 
 
 def mesh_charts(

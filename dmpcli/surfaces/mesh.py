@@ -111,9 +111,10 @@ class Mesh:
 
         About a smooth point a normal leans off a facet by about the angle between facets there.
         """
-        lean = np.degrees(np.arccos(np.clip(dot(normals, self.face_normals[:, None])[..., 0], -1, 1)))
+        cosine = dot(normals, self.face_normals[:, None])[..., 0]
+        lean = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
         bent = np.maximum(self.dihedrals, np.roll(self.dihedrals, 1, axis=1))
-        return (lean > _LEANING + _TIMES * bent) & (self.noise == 0.0)[:, None]
+        return np.asarray((lean > _LEANING + _TIMES * bent) & (self.noise == 0.0)[:, None])
 
     def _ends(self, edges: Booleans) -> Booleans:
         """Vertices, shape (n,), at the ends of edges marked (m, 3)."""

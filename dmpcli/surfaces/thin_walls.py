@@ -18,13 +18,11 @@ if TYPE_CHECKING:
 # Walls thinner than this, mm, are thin, and those thinner than so many times the distance of the
 # goal from them.
 _THIN, _TIMES = 1.0, 4.0
-# Facets that look away from each other.
-_AWAY = -0.5
+# The sides of a wall look away from each other; those of a wedge, at a rim, less so.
+_AWAY = -0.9
 
 
-def mistaken(
-    mesh: "Mesh", origin: Floats, goal: Floats, off: Floats, lengths: Floats
-) -> Booleans:
+def mistaken(mesh: "Mesh", origin: Floats, goal: Floats, off: Floats, lengths: Floats) -> Booleans:
     """Tell which goals are behind a thin wall, on whose near side a shorter line arrives.
 
     Parameters

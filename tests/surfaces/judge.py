@@ -4,6 +4,7 @@ The tracer walks straight over the facets, one line at a time. With it goals are
 pair has a geodesic), strokes are told that lie on one smooth patch, and refusals are confirmed.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,6 +99,79 @@ class Judge:
         face[reached] = self.mesh.search(feet[reached])[1]
         return feet, face, reached
 
+    def cross_line(self, pairs, i, heading, u, v):
+        """Return the end, its face and e_u there of the cross line to (u, v)."""
+        u, v = max(u, 1e-5), v if abs(v) > 1e-5 else 1e-5
+        line = self.line(pairs.face[i], pairs.start[i], heading, u)
+        ahead = line[-1] - line[-2]
+        face = self.mesh.search((line[-1] - 1e-7 * ahead)[None])[1][0]
+        ahead /= np.linalg.norm(ahead)
+        sideways = np.cross(self.mesh.face_normals[face], ahead) * np.sign(v)
+        out = self.line(face, line[-1], sideways, abs(v))
+        off = out[-1] - out[-2]
+        face = self.mesh.search((out[-1] - 1e-7 * off)[None])[1][0]
+        along = np.cross(off / np.linalg.norm(off) * np.sign(v), self.mesh.face_normals[face])
+        return out[-1], face, along
+
+    def confirms(self, status, pairs, i, heading, length, coordinates):
+        """Tell whether the tracer meets what a stroke is refused for, on the same centre line."""
+        if status == Status.OTHER_SIDE:
+            return self._thin(pairs.goal[i])
+        feet, _, reached = self.strip(pairs, i, heading, length, coordinates)
+        if status == Status.BORDER:
+            return not reached.all()
+        if not reached.all():
+            return False
+        if status == Status.TORN:
+            return self._torn(pairs, i, heading, coordinates, feet)
+        if status == Status.FOLDED:
+            return self._folded(pairs, i, heading, coordinates)
+        return False
+
+    def _thin(self, goal):
+        """Tell whether a facet that looks the other way is less than a mm behind a goal."""
+        a, b, c = np.moveaxis(self.mesh.corners, 1, 0)
+        n = self.mesh.face_normals[self.mesh.search(goal[None])[1][0]]
+        normal = np.cross(b - a, c - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = np.sum((a - goal) * normal, axis=1) / (normal @ -n)
+            hit = goal - depth[:, None] * n
+            inside = np.all(
+                [
+                    np.sum(np.cross(q - p, hit - p) * normal, axis=1) >= 0.0
+                    for p, q in ((a, b), (b, c), (c, a))
+                ],
+                axis=0,
+            )
+        return np.any(inside & (depth > 1e-6) & (depth <= 1.0) & (normal @ n < 0.0))
+
+    def _torn(self, pairs, i, heading, coordinates, feet):
+        """Tell whether points stay apart however near their coordinates are."""
+        apart = np.linalg.norm(np.diff(feet, axis=0), axis=1)
+        flat = np.linalg.norm(np.diff(coordinates[:, :2], axis=0), axis=1)
+        for k in np.argsort(3.0 * flat - apart)[:5]:
+            ends = [coordinates[k], coordinates[k + 1]]
+            for _ in range(24):
+                middle = 0.5 * (ends[0] + ends[1])
+                at = [self.cross_line(pairs, i, heading, *c[:2])[0] for c in (*ends, middle)]
+                nearer = np.linalg.norm(at[2] - at[0]) < np.linalg.norm(at[2] - at[1])
+                ends[0 if nearer else 1] = middle
+            if np.linalg.norm(at[1] - at[0]) > 0.1:
+                return True
+        return False
+
+    def _folded(self, pairs, i, heading, coordinates):
+        """Tell whether cross lines that begin ahead end back along e_u, by a fifth of a mm."""
+        some = coordinates[coordinates[:, 0] > 0.01]
+        lines = [self.cross_line(pairs, i, heading, u, v) for u, v in some[:, :2]]
+        at, face, along = (np.array(part) for part in zip(*lines, strict=True))
+        normal = self.mesh.face_normals[face]
+        way = np.sum(np.diff(at, axis=0) * 0.5 * (along[1:] + along[:-1]), axis=1)
+        # Over a crease there is no one direction.
+        way[np.sum(normal[1:] * normal[:-1], axis=1) < np.cos(np.radians(10.0))] = 0.0
+        gone = np.concatenate([[0.0], np.cumsum(way)])
+        return np.max(np.maximum.accumulate(gone) - gone) > 0.2
+
 
 def traced(judge, count, rng, reach=(10.0, 30.0)):
     """Return pairs of random starts by area, and goals at random lengths in random headings."""
@@ -111,7 +185,10 @@ def traced(judge, count, rng, reach=(10.0, 30.0)):
     heading /= np.linalg.norm(heading, axis=1, keepdims=True)
     length = rng.uniform(*reach, count)
     goal = np.array(
-        [judge.line(f, s, h, r)[-1] for f, s, h, r in zip(face, start, heading, length, strict=True)]
+        [
+            judge.line(f, s, h, r)[-1]
+            for f, s, h, r in zip(face, start, heading, length, strict=True)
+        ]
     )
     return Pairs(start, goal, normal, heading, face, length)
 
@@ -177,10 +254,49 @@ def draw(judge, pairs):
 
 
 def leaning(mesh, position, face, normal):
-    """Angles, degrees (B, T), between normals and the facet at positions, or one that touches it."""
+    """Angles, degrees (B, T), of normals to the facet at positions, or one that touches it."""
     either = np.concatenate([face[..., None], mesh.topology.neighbours[face]], axis=-1)
     flat = mesh.face_normals[either]
     near = np.abs(np.sum((position[..., None, :] - mesh.corners[either, 0]) * flat, axis=-1)) < 1e-5
     near &= either >= 0
     cosine = np.where(near, np.abs(np.sum(normal[..., None, :] * flat, axis=-1)), 0.0).max(axis=-1)
     return np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of pairs: how many, drawn, wrong ones by what is wrong, refused by status.
+
+    `unconfirmed` are the refusals whose reason the tracer does not meet, as (row, status).
+    """
+
+    count: int
+    drawn: int
+    wrong: dict
+    refused: dict
+    unconfirmed: list
+
+
+def verdict(judge, pairs):
+    """Draw waves on pairs and judge them all."""
+    drawn = draw(judge, pairs)
+    status, charts = drawn.lift.status, drawn.charts
+    unconfirmed = []
+    for i in np.flatnonzero(status != Status.DRAWN):
+        what = Status(int(status[i]))
+        line = charts.centre.direction[i], charts.lengths[i]
+        if not judge.confirms(what, pairs, i, *line, drawn.coordinates[i]):
+            unconfirmed.append((int(i), what.name))
+    return Verdict(
+        len(status),
+        int((status == Status.DRAWN).sum()),
+        dict(Counter(word for word in drawn.wrong if word)),
+        dict(Counter(Status(int(one)).name for one in status if one != Status.DRAWN)),
+        unconfirmed,
+    )
+
+
+def verdicts(mesh, count, seed):
+    """Judge so many pairs on smooth patches, and as many traced anywhere."""
+    judge, rng = Judge(mesh), np.random.default_rng(seed)
+    return verdict(judge, smooth(judge, count, rng)), verdict(judge, traced(judge, count, rng))

@@ -89,11 +89,17 @@ def cone(half_angle, sides=40, size=60.0):
     return Mesh(np.vstack([[[0.0, 0.0, 0.0]], rim]), F)
 
 
-def test_normals_near_the_tip_of_a_cone_lean_off_its_facets():
-    blunt, sharp = cone(80.0), cone(50.0)
+def test_normals_at_the_tip_of_a_cone_are_those_of_its_facets_unless_it_is_too_coarse():
+    blunt, sharp, coarse = cone(80.0), cone(50.0), cone(50.0, 12)
     assert not blunt.steep.any()
-    assert sharp.steep.all()
-    for mesh, right in ((blunt, Status.DRAWN), (sharp, Status.TILTED)):
+    assert not sharp.steep.any()
+    assert coarse.steep.all()
+    np.testing.assert_allclose(sharp.corner_normals[:, 0], sharp.face_normals, atol=1e-12)
+    for mesh, right in (
+        (blunt, Status.DRAWN),
+        (sharp, Status.DRAWN),
+        (coarse, Status.TILTED),
+    ):
         face = np.zeros((1, 5), dtype=np.int64)
         position = mesh.corners[:1, :1] + 0.01 * (mesh.corners[:1].mean(axis=1) * np.ones((5, 1)))
         normal = mesh.smooth_normals(position[0], face[0])[None]

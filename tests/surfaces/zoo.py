@@ -71,7 +71,8 @@ def rounded():
 
 def chamfered():
     slabs = [
-        Manifold.cube(size, True) for size in ((80.0, 54.0, 34.0), (74.0, 60.0, 34.0), (74.0, 54.0, 40.0))
+        Manifold.cube(size, True)
+        for size in ((80.0, 54.0, 34.0), (74.0, 60.0, 34.0), (74.0, 54.0, 40.0))
     ]
     return Manifold.batch_hull(slabs) - rod(50.0, 9.0, segments=56).translate((0.0, 0.0, -25.0))
 
@@ -94,7 +95,9 @@ def shaft():
 
 
 def flange():
-    part = turned([(14.0, 0.0), (45.0, 0.0), (45.0, 12.0), (26.0, 12.0), (22.0, 40.0), (14.0, 40.0)])
+    part = turned(
+        [(14.0, 0.0), (45.0, 0.0), (45.0, 12.0), (26.0, 12.0), (22.0, 40.0), (14.0, 40.0)]
+    )
     for k in range(6):
         a = np.radians(60.0 * k)
         part -= rod(20.0, 3.5, segments=36).translate((36 * np.cos(a), 36 * np.sin(a), -2.0))
@@ -133,7 +136,9 @@ def ring():
 
 
 def domed():
-    ball = Manifold.sphere(60.0, 120).translate((0.0, 0.0, -30.0)).trim_by_plane((0.0, 0.0, 1.0), 0.0)
+    ball = (
+        Manifold.sphere(60.0, 120).translate((0.0, 0.0, -30.0)).trim_by_plane((0.0, 0.0, 1.0), 0.0)
+    )
     return ball - plate(30.0, 16.0, 30.0, 4.0, 32).translate((8.0, 0.0, 22.0))
 
 
