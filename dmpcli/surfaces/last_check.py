@@ -115,14 +115,15 @@ def _beside(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
 
 
 def _tilted(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
-    rows, samples = np.nonzero(mesh.steep[feet.face] & on)
+    lean = np.abs(np.einsum("bti,bti->bt", feet.normal, mesh.face_normals[feet.face]))
+    rows, samples = np.nonzero((lean < _TILTED) & (mesh.noise[feet.face] == 0.0) & on)
     tilted = np.zeros(len(feet.face), dtype=bool)
     if len(rows) == 0:
         return tilted
     position, normal = feet.position[rows, samples], feet.normal[rows, samples]
     face = feet.face[rows, samples]
     # A point of an edge is on either facet.
-    either = np.concatenate([face[:, None], mesh.topology.neighbours[face]], axis=1)
+    either = mesh.topology.neighbours[face]
     flat, corner = mesh.face_normals[either], mesh.corners[either, 0]
     holds = np.abs(dot(normal[:, None], flat)[..., 0]) >= _TILTED
     holds &= np.abs(dot(position[:, None] - corner, flat)[..., 0]) < _SAME
