@@ -341,13 +341,18 @@ def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
 
 
 def _landed(mesh: Mesh, first: Aim, aim: Aim, ends: shooting.Ends) -> Booleans:
-    """Tell which smooth courses end at their goals, on the goals' side, and are no short cuts."""
+    """Tell which smooth courses end at their goals, on the goals' side, and are no short cuts.
+
+    There are none over holes on solids, where what was stepped over is a rib or a groove.
+    """
     landed, face = mesh.search(ends.position)
     there = length(landed - first.goal)[:, 0] <= shooting.HIT + mesh.noise[face]
     normal = first.sign * mesh.closest(first.goal).normal
     there &= dot(normal, ends.normal)[:, 0] > 0.0
     short = last_check.shorter_than_chord(mesh, first.origin, first.goal, aim.length[:, 0])
-    return np.asarray(there & ~short)
+    solid = (mesh.outward[first.part] != 0.0) & (mesh.noise[face] == 0.0)
+    solid &= len(mesh.slits) == 0
+    return np.asarray(there & ~short & ~(ends.off & solid))
 
 
 def _stepped(

@@ -13,6 +13,7 @@ import potpourri3d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from dmpcli.surfaces import all_headings
 from dmpcli.surfaces.protocol import Status
 from tests.surfaces import fields
 
@@ -284,8 +285,13 @@ def verdict(judge, pairs):
     unconfirmed = []
     for i in np.flatnonzero(status != Status.DRAWN):
         what = Status(int(status[i]))
-        line = charts.centre.direction[i], charts.lengths[i]
-        if not judge.confirms(what, pairs, i, *line, drawn.coordinates[i]):
+        heading, length = charts.centre.direction[i], charts.lengths[i]
+        stroke = drawn.coordinates[i].copy()
+        if not charts.creased[i]:  # a line that was stepped along is not the facets' own
+            ends = pairs.start[i][None], pairs.goal[i][None]
+            heading, length, _ = (found[0] for found in all_headings.find(judge.mesh, *ends))
+            stroke[:, 0] *= length / charts.lengths[i]
+        if not judge.confirms(what, pairs, i, heading, length, stroke):
             unconfirmed.append((int(i), what.name))
     return Verdict(
         len(status),
