@@ -70,11 +70,12 @@ def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats)
         `Status`: TORN, MISSED, LOST or TILTED, else DRAWN.
     """
     on = ~np.maximum.accumulate(feet.outside, axis=1)
+    plane = mesh.planes[feet.face]
     wrong = [
         (_torn(feet, on), Status.TORN),
         (_missed(mesh, feet, on, start, goal, goals), Status.MISSED),
-        (_beside(mesh, feet, on), Status.LOST),
-        (_tilted(mesh, feet, on), Status.TILTED),
+        (_beside(plane, feet, on), Status.LOST),
+        (_tilted(mesh, plane, feet, on), Status.TILTED),
     ]
     which, what = [mark for mark, _ in wrong], [np.int64(status) for _, status in wrong]
     return np.select(which, what, np.int64(Status.DRAWN))
@@ -108,15 +109,16 @@ def _missed(
     return missed
 
 
-def _beside(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
-    plane = mesh.planes[feet.face]
+def _beside(plane: Floats, feet: Feet, on: Booleans) -> Booleans:
     off = np.einsum("bti,bti->bt", feet.position, plane[..., :3]) - plane[..., 3]
     return np.asarray(np.any((np.abs(off) > _ON) & on, axis=1))
 
 
-def _tilted(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
-    lean = np.abs(np.einsum("bti,bti->bt", feet.normal, mesh.face_normals[feet.face]))
-    rows, samples = np.nonzero((lean < _TILTED) & (mesh.noise[feet.face] == 0.0) & on)
+def _tilted(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
+    lean = np.abs(np.einsum("bti,bti->bt", feet.normal, plane[..., :3]))
+    rows, samples = np.nonzero((lean < _TILTED) & on)
+    smooth = mesh.noise[feet.face[rows, samples]] == 0.0
+    rows, samples = rows[smooth], samples[smooth]
     tilted = np.zeros(len(feet.face), dtype=bool)
     if len(rows) == 0:
         return tilted
