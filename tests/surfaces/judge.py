@@ -245,7 +245,7 @@ def draw(judge, pairs):
     checks = {
         "end": ends > 0.01,
         "torn": (move > 3.0 * flat + 0.3).any(axis=1),
-        "off the mesh": (hits.distance > 1e-6).any(axis=1),
+        "off the mesh": (hits.distance > 1e-5).any(axis=1),
         "leans": (lean > 15.0).any(axis=1),
     }
     for word, mark in checks.items():
