@@ -162,7 +162,7 @@ def _settled(task: Task, stroke: Stroke) -> tuple[Stroke, str]:
         return stroke, OK
     if stroke.status == Status.BORDER and task.on_border == "clip":
         return stroke.until_border(), OK
-    return stroke, stroke.status.reason
+    return stroke, stroke.status.said
 
 
 def draw_part(job: Job, part: Part) -> Outcome:

@@ -363,6 +363,7 @@ def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings
 
 
 def _remedy(status: str, on_surface: bool) -> str:
+    """What to do about a stroke that the arm cannot reach or follow."""
     if "duration" in status:  # too fast for a joint
         return "give a longer --duration"
     return "move start and goal" + (", or choose another surface" if on_surface else "")
@@ -394,7 +395,8 @@ def _write_one(
         [drawn] = draw(task.skill, pairs, duration, given, task.style)
     [(stroke, status)] = settle(task, [drawn])
     if status != OK:
-        raise RefusedError(f"{status}; {_remedy(status, given is not None)}")
+        whole = status == stroke.status.said
+        raise RefusedError(status if whole else f"{status}; {_remedy(status, given is not None)}")
     seen, heights = seen_from(task.skill, task.style, pairs, given)
     ends = end_heights(seen, heights)
     facts = (

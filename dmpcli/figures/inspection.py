@@ -65,7 +65,7 @@ def inspected(source: Source) -> Row:
         return head | {"format": "Parquet"} | _ours(source)
     if records_tables.is_parquet(source):
         return head | {"format": "Parquet"} | _foreign(source)
-    if content.lstrip()[:1] == b"{":
+    if content.lstrip()[:1] == b"{" and not mesh_formats.is_gltf(source):
         return head | {"format": "JSON"} | _json(source)
     if source.name.endswith(".toml"):
         return head | {"format": "TOML"} | _toml(source)

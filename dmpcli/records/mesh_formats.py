@@ -113,9 +113,17 @@ _PARTS = (
 """Formats that are zip files, by the name of a file in them."""
 
 
+def is_gltf(source: Source) -> bool:
+    """Tell text glTF, which is JSON but none of ours: it must name its asset's version."""
+    content = source.content
+    return content.lstrip()[:1] == b"{" and b'"asset"' in content and b'"version"' in content
+
+
 def _foreign(source: Source) -> tuple[str, str] | None:
     """Name of a format that is not read, and a program that reads it."""
     content = source.content
+    if is_gltf(source):
+        return "a glTF file", _MESHES
     start = content[:4096].lstrip()
     for mark, name, program in _STARTS:
         if start.startswith(mark):

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from dmpcli.errors import InputError
-from dmpcli.records import cylinder, documents, mesh, plane, sphere
+from dmpcli.records import cylinder, documents, mesh, mesh_formats, plane, sphere
 from dmpcli.records.mesh import MeshFile
 from dmpcli.records.pose import Pose
 from dmpcli.records.streams import Source
@@ -73,7 +73,7 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
     InputError
         None of them, or one that is damaged or cannot be mended; by name.
     """
-    if source.content.lstrip()[:1] != b"{":
+    if source.content.lstrip()[:1] != b"{" or mesh_formats.is_gltf(source):
         found = mesh.decode(source, unit or "mm", "--surface-unit")
         return found if pose is None else found._replace(V=pose.to_base(found.V))
     document = documents.json_document(source)

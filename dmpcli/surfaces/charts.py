@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces import last_check, shooting, strip, unfolding
+from dmpcli.surfaces import last_check, shooting, strip, thin_walls, unfolding
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.nodes import Centre
 from dmpcli.surfaces.protocol import Lift, Status, Walks, first_refusal, towards
@@ -17,10 +17,14 @@ from dmpcli.surfaces.walked import closed_direction, goal_coordinates, walk_samp
 COINCIDENT = 1e-6
 # A stroke that is walked over a crease is followed this much at a time to see whether it folds, mm.
 _LEAST_MOVE = 1e-3
+# It folds where it comes back by more than this, mm.
+_OVERLAP = 0.3
 # Points beside the border by more than this, mm, and by more than this part of their distance to
 # the mesh, are surely not over it.
 _BESIDE, _LEANING = 1.0, 0.2
 _FLAT = np.cos(np.radians(10.0))
+# What a smooth course over facets can come to though the stroke can be drawn.
+_MAY_BE_WRONG = (Status.OTHER_SIDE, Status.LOST, Status.TORN, Status.MISSED, Status.TILTED)
 
 
 @dataclass(frozen=True)
@@ -106,22 +110,59 @@ class MeshCharts:
             better = smooth[part.slivers & ~part.sharp & (part.status == Status.DRAWN)]
             if len(better):
                 face[self._improve(better, coordinates[better], foot, axes)] = -1
-        creased = np.flatnonzero(unfolded)
-        if len(creased):
-            foot[creased], axes[creased], outside[creased], status[creased] = self._unfold(
-                creased, coordinates[creased]
-            )
-            face[creased], stretch[creased] = -1, 1.0
-            # Straight lines over noisy facets go astray by millimetres.
-            noisy = creased[self._crosses_noise(foot[creased])]
-            status[noisy], unfolded[noisy] = Status.NOISY, False
-        # A stroke that is torn at a corner goes backwards there too, which is no fold.
-        walked = unfolded & (status == Status.FOLDED)
-        drawn = np.flatnonzero((status == Status.DRAWN) | (status == Status.BORDER) | walked)
         feet = last_check.Feet(coordinates, foot, axes[..., 2], face, stretch, outside)
-        status[drawn] = first_refusal(self._checked(drawn, feet), status[drawn])
+        self._check(np.flatnonzero(~unfolded), feet, status)
+        self._walk_facets(np.flatnonzero(unfolded), feet, axes, status)
+        self._try_facets(unfolded, feet, axes, status)
         position = foot + coordinates[..., 2:] * axes[..., 2]
         return Lift(position, axes, outside, status, unfolded)
+
+    def _check(self, rows: Integers, feet: last_check.Feet, status: Integers) -> None:
+        """Put what is wrong with some of the strokes that were drawn into their status."""
+        # A stroke that is torn at a corner goes backwards there too, which is no fold.
+        looked = (Status.DRAWN, Status.BORDER, Status.FOLDED)
+        rows = rows[np.isin(status[rows], looked)]
+        status[rows] = first_refusal(self._checked(rows, feet), status[rows])
+
+    def _walk_facets(
+        self, rows: Integers, feet: last_check.Feet, axes: Floats, status: Integers
+    ) -> None:
+        """Walk the strokes of some pairs from facet to facet, and check them."""
+        if len(rows) == 0:
+            return
+        foot, axes[rows], feet.outside[rows], status[rows] = self._unfold(
+            rows, feet.coordinates[rows]
+        )
+        feet.position[rows], feet.normal[rows] = foot, axes[rows][..., 2]
+        feet.face[rows], feet.stretch[rows] = -1, 1.0
+        self._check(rows, feet, status)
+        # Straight lines over noisy facets go astray by millimetres.
+        status[rows[self._crosses_noise(foot)]] = Status.NOISY
+
+    def _try_facets(
+        self, unfolded: Booleans, feet: last_check.Feet, axes: Floats, status: Integers
+    ) -> None:
+        """Walk strokes from facet to facet where the smooth course is refused, and may be wrong.
+
+        Steps of some mm pass thin ribs, grooves and the tips of cones. What is refused on the
+        facets too is refused for what happened there, unless that tells less.
+        """
+        closed = (self.mesh.outward[self.centre.part] != 0.0) & (len(self.mesh.slits) == 0)
+        wrong = np.isin(status, _MAY_BE_WRONG) | (closed & (status == Status.BORDER))
+        rows = np.flatnonzero(wrong & ~unfolded & (self.status == Status.DRAWN))
+        if len(rows) == 0:
+            return
+        before = status[rows].copy()
+        second = last_check.Feet(*(getattr(feet, field.name).copy() for field in fields(feet)))
+        turned = axes.copy()
+        self._walk_facets(rows, second, turned, status)
+        tells = np.isin(status[rows], (Status.NO_GEODESIC, Status.NOISY))
+        status[rows] = np.where(tells, before, status[rows])
+        better = rows[status[rows] == Status.DRAWN]
+        unfolded[better] = True
+        axes[better] = turned[better]
+        for field in fields(feet):
+            getattr(feet, field.name)[better] = getattr(second, field.name)[better]
 
     def _stop_at_slits(
         self, rows: Integers, foot: Floats, outside: Booleans, status: Integers
@@ -198,14 +239,20 @@ class MeshCharts:
 
 
 def _folded(foot: Floats, axes: Floats, coordinates: Floats) -> Booleans:
-    """Tell which strokes (R, T, 3) move backwards along e_u while u goes on, shape (R,)."""
+    """Tell which strokes (R, T, 3) come back along e_u while u goes on, shape (R,).
+
+    By more than `_OVERLAP` in all: beyond each corner of a faceted rim a little of the surface is
+    come over twice, and the lines go on after it.
+    """
     move, change = np.diff(foot, axis=1), np.diff(coordinates, axis=1)
     along = 0.5 * (dot(move, axes[:, :-1, :, 0])[..., 0] + dot(move, axes[:, 1:, :, 0])[..., 0])
     du, dv = change[..., 0], change[..., 1]
     clear = (np.abs(du) > _LEAST_MOVE) & (np.abs(du) > 0.2 * np.abs(dv))
     # The chord over a crease is in neither facet.
     clear &= dot(axes[:, :-1, :, 2], axes[:, 1:, :, 2])[..., 0] > _FLAT
-    return np.asarray(np.any(clear & (along * du < 0.0), axis=1))
+    gone = np.cumsum(np.where(clear, along * np.sign(du), 0.0), axis=1)
+    back = np.maximum.accumulate(np.maximum(gone, 0.0), axis=1) - gone
+    return np.asarray(np.any(back > _OVERLAP, axis=1))
 
 
 def mesh_charts(
@@ -235,11 +282,14 @@ def mesh_charts(
         goals = goal_coordinates(charts.lift, b.position)
         return MeshCharts(mesh, centre, b.position, zeros[:, 0], goals, apart, creased)
     link = connect(mesh, centre, b.position, apart)
-    turned = dot(sign * b.normal, link.normal)[:, 0] < 0.0
-    turned &= link.status == Status.DRAWN
+    status = link.status.copy()
+    around = np.flatnonzero((status == Status.DRAWN) & link.creased)
+    if len(around):
+        ends = centre.origin[around], b.position[around], b.distance[around]
+        thin = thin_walls.mistaken(mesh, *ends, link.length[around])
+        status[around[thin]] = Status.OTHER_SIDE
     centre = Centre(a.position, normal, link.direction, link.step, sign, part)
     goals = np.stack([link.length, 0.0 * link.length, 0.0 * link.length], axis=-1)
-    status = np.where(turned, Status.OTHER_SIDE, link.status)
     return MeshCharts(mesh, centre, b.position, link.length, goals, status, link.creased)
 
 
@@ -273,19 +323,55 @@ def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
     first = _aim(centre.rows(rows), goal[rows])
     aim, ends, good = shooting.hit(mesh, first, shooting.by_steps)
     # What stands over the goal by no more than the rounding of facets may belong beside it.
-    landed, face = mesh.search(ends.position)
-    good &= length(landed - first.goal)[:, 0] <= shooting.HIT + mesh.noise[face]
+    good &= _landed(mesh, first, aim, ends)
     creases = np.flatnonzero(ends.sharp | ~good)
     if len(creases):
-        again, there, good[creases] = shooting.hit(mesh, first.rows(creases), shooting.by_facets)
+        smooth = ~ends.sharp[creases]
+        again, there, hit = shooting.hit(mesh, first.rows(creases), shooting.by_facets)
+        good[creases] = hit
         aim.direction[creases], aim.length[creases] = again.direction, again.length
         ends.fill(creases, there, np.ones(len(creases), dtype=bool))
+        # The chord and a fan about it may have led astray on a surface that is smooth all the way.
+        creases = np.delete(creases, _stepped(mesh, aim, ends, creases, hit & smooth))
     creased[rows[creases]] = True
     direction[rows], normal[rows] = aim.direction, ends.normal
     lengths[rows], step[rows] = aim.length[:, 0], aim.length / aim.steps[:, None]
-    short = last_check.shorter_than_chord(mesh, first.origin, first.goal, aim.length[:, 0])
-    status[rows] = np.where(good, np.where(short, Status.TORN, Status.DRAWN), Status.NO_GEODESIC)
+    status[rows] = np.where(good, Status.DRAWN, Status.NO_GEODESIC)
     return Link(direction, normal, step, lengths, status, creased)
+
+
+def _landed(mesh: Mesh, first: Aim, aim: Aim, ends: shooting.Ends) -> Booleans:
+    """Tell which smooth courses end at their goals, on the goals' side, and are no short cuts.
+
+    There are none over holes on solids, where what was stepped over is a rib or a groove.
+    """
+    landed, face = mesh.search(ends.position)
+    there = length(landed - first.goal)[:, 0] <= shooting.HIT + mesh.noise[face]
+    normal = first.sign * mesh.closest(first.goal).normal
+    there &= dot(normal, ends.normal)[:, 0] > 0.0
+    short = last_check.shorter_than_chord(mesh, first.origin, first.goal, aim.length[:, 0])
+    solid = (mesh.outward[first.part] != 0.0) & (mesh.noise[face] == 0.0)
+    solid &= len(mesh.slits) == 0
+    return np.asarray(there & ~short & ~(ends.off & solid))
+
+
+def _stepped(
+    mesh: Mesh, aim: Aim, ends: shooting.Ends, rows: Integers, which: Booleans
+) -> Integers:
+    """Step along what some of the rows found from facet to facet; which can be had that way."""
+    some = np.flatnonzero(which)
+    if len(some) == 0:
+        return some
+    trial = aim.rows(rows[some])
+    trial.steps = np.maximum(4, np.ceil(trial.length[:, 0] / shooting.STEP)).astype(np.int64)
+    found, there, good = shooting.corrected(mesh, trial)
+    good &= ~there.sharp & _landed(mesh, trial, found, there)
+    kept = rows[some[good]]
+    aim.direction[kept], aim.length[kept] = found.direction[good], found.length[good]
+    aim.steps[kept] = found.steps[good]
+    ends.fill(kept, there, good)
+    stepped: Integers = some[good]
+    return stepped
 
 
 def walk(mesh: Mesh, origin: Floats, direction: Floats, way: Floats) -> Walks:

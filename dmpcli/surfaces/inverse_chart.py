@@ -52,7 +52,7 @@ class Inverse:
         Distance of what `Charts.lift` makes of the coordinates to the position, mm.
     status : array of int, shape (B,)
         `Status` of the chart, or of its lift to these coordinates; where that says DRAWN and
-        samples are not reached, BORDER.
+        samples are not reached, BORDER if they are beside the surface, else FOLDED.
     """
 
     coordinates: Floats
@@ -223,9 +223,9 @@ def _judged(charts: Charts, position: Floats, found: Sought, over: Booleans) -> 
     miss = np.linalg.norm(lift.position - position, axis=-1)
     usable = np.isin(lift.status, (Status.DRAWN, Status.BORDER))[:, None]
     reached = over & found.good & usable & ~lift.outside & (miss < ASTRAY) & (found.area > FOLDS)
-    status = np.where(
-        (lift.status == Status.DRAWN) & ~reached.all(axis=1), Status.BORDER, lift.status
-    )
+    beside = np.where((~over | lift.outside).any(axis=1), Status.BORDER, Status.FOLDED)
+    short = (lift.status == Status.DRAWN) & ~reached.all(axis=1)
+    status = np.where(short, beside, lift.status)
     return Inverse(
         np.where(reached[..., None], coordinates, np.nan),
         np.where(reached[..., None, None], lift.axes, np.nan),

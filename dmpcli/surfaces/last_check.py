@@ -70,11 +70,12 @@ def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats)
         `Status`: TORN, MISSED, LOST or TILTED, else DRAWN.
     """
     on = ~np.maximum.accumulate(feet.outside, axis=1)
+    plane = mesh.planes[feet.face]
     wrong = [
         (_torn(feet, on), Status.TORN),
         (_missed(mesh, feet, on, start, goal, goals), Status.MISSED),
-        (_beside(mesh, feet, on), Status.LOST),
-        (_tilted(mesh, feet, on), Status.TILTED),
+        (_beside(plane, feet, on), Status.LOST),
+        (_tilted(mesh, plane, feet, on), Status.TILTED),
     ]
     which, what = [mark for mark, _ in wrong], [np.int64(status) for _, status in wrong]
     return np.select(which, what, np.int64(Status.DRAWN))
@@ -108,21 +109,23 @@ def _missed(
     return missed
 
 
-def _beside(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
-    plane = mesh.planes[feet.face]
+def _beside(plane: Floats, feet: Feet, on: Booleans) -> Booleans:
     off = np.einsum("bti,bti->bt", feet.position, plane[..., :3]) - plane[..., 3]
     return np.asarray(np.any((np.abs(off) > _ON) & on, axis=1))
 
 
-def _tilted(mesh: Mesh, feet: Feet, on: Booleans) -> Booleans:
-    rows, samples = np.nonzero(mesh.steep[feet.face] & on)
+def _tilted(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
+    lean = np.abs(np.einsum("bti,bti->bt", feet.normal, plane[..., :3]))
+    rows, samples = np.nonzero((lean < _TILTED) & on)
+    smooth = mesh.noise[feet.face[rows, samples]] == 0.0
+    rows, samples = rows[smooth], samples[smooth]
     tilted = np.zeros(len(feet.face), dtype=bool)
     if len(rows) == 0:
         return tilted
     position, normal = feet.position[rows, samples], feet.normal[rows, samples]
     face = feet.face[rows, samples]
     # A point of an edge is on either facet.
-    either = np.concatenate([face[:, None], mesh.topology.neighbours[face]], axis=1)
+    either = mesh.topology.neighbours[face]
     flat, corner = mesh.face_normals[either], mesh.corners[either, 0]
     holds = np.abs(dot(normal[:, None], flat)[..., 0]) >= _TILTED
     holds &= np.abs(dot(position[:, None] - corner, flat)[..., 0]) < _SAME

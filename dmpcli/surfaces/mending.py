@@ -66,7 +66,7 @@ def mended(V: Floats, F: Integers) -> Mended:
     ------
     InputError
         No faces, an index out of range, a coordinate that is not finite or too large, or a
-        one-sided component; says which and where.
+        one-sided component that cannot be cut; says which and where.
     """
     draft, remark = _checked(V, F)
     remarks = [remark]
@@ -329,17 +329,36 @@ def _oriented(draft: _Draft, _: float) -> tuple[_Draft, str]:
     if not draft.edges.at_odds.any():
         return draft, ""
     turned, component = igl.bfs_orient(draft.F)
-    if _Draft(draft.V, turned).edges.at_odds.any():
-        raise InputError(
-            "is one-sided somewhere, like a Möbius strip, so that no normal can be chosen; cut it, "
-            "or mend it in the program that made it"
-        )
     over = (turned != draft.F).any(axis=1)
     against = 2 * np.bincount(component, weights=over) > np.bincount(component)
     turned = np.where(against[component][:, None], turned[:, ::-1], turned)
     over ^= against[component]
+    done = _Draft(draft.V, turned)
     remark = f"{_count(int(over.sum()), 'face')} turned over to agree with the others"
-    return _Draft(draft.V, turned), remark
+    if not done.edges.at_odds.any():
+        return done, remark
+    cut, where = _cut(done)
+    if cut.edges.at_odds.any():
+        raise InputError(
+            "is one-sided somewhere, so that no normal can be chosen; cut it, or mend it in the "
+            "program that made it"
+        )
+    return cut, f"{remark}; {where}" if over.any() else where
+
+
+def _cut(draft: _Draft) -> tuple[_Draft, str]:
+    """Cut what is one-sided along the edges where it does not agree with itself.
+
+    About a vertex there is an even number of them, so that they part its faces into fans.
+    """
+    odd = draft.edges.half[draft.edges.one[draft.edges.at_odds]]
+    x, y, z = draft.V[odd[0]].mean(axis=0)
+    cut, _ = _split(draft, _fans(draft, over_odds=False))
+    remark = (
+        f"one-sided, like a Möbius strip, and cut along {_count(len(odd), 'edge')}, the first at "
+        f"({x:.6g}, {y:.6g}, {z:.6g}) mm, where no stroke is drawn across"
+    )
+    return cut, remark
 
 
 def _forked(draft: _Draft, _: float) -> tuple[_Draft, str]:
@@ -384,10 +403,11 @@ def _still_joined(draft: _Draft) -> Integers:
     return half[uses[of.reshape(-1)] > 1]
 
 
-def _fans(draft: _Draft) -> Integers:
+def _fans(draft: _Draft, over_odds: bool = True) -> Integers:
     """Number the fans of faces about vertices, joined by edges of two faces: of each corner (3m,).
 
-    Corners are numbered as half edges are: k m + i for corner k of face i.
+    Corners are numbered as half edges are: k m + i for corner k of face i. Edges whose faces are
+    wound at odds join them only `over_odds`.
     """
     F, edges, m = draft.F, draft.edges, len(draft.F)
     one, other = edges.one, edges.other
@@ -400,23 +420,28 @@ def _fans(draft: _Draft) -> Integers:
             np.stack([end, np.where(odd, there[1], there[0])], axis=1),
         ]
     )
+    if not over_odds:
+        pairs = pairs[~np.tile(odd, 2)]
     return _groups(3 * m, pairs)[1] if len(F) else np.empty(0, dtype=np.int64)
 
 
 def _parted(draft: _Draft, _: float) -> tuple[_Draft, str]:
     """Give every fan of faces its own vertex where sheets touch (bow-ties, crowded edges)."""
+    draft, added = _split(draft, _fans(draft))
+    ties = int((~np.isin(added, draft.forks)).sum())
+    remark = f"{_count(ties, 'bow-tie')} parted: sheets that touch in one point" if ties else ""
+    return draft, remark
+
+
+def _split(draft: _Draft, fan: Integers) -> tuple[_Draft, Integers]:
+    """Give fans of corners (3m,) vertices of their own; also those that were there before, once."""
     V, F, m = draft.V, draft.F, len(draft.F)
-    fan = _fans(draft)
     owner = np.empty(int(fan.max()) + 1, dtype=np.int64)
     owner[fan] = F.T.ravel()
     number = np.full(len(owner), -1)
     used, keeps = np.unique(owner, return_index=True)
     number[keeps] = used
     added = np.flatnonzero(number < 0)
-    if len(added) == 0:
-        return draft, ""
     number[added] = len(V) + np.arange(len(added))
     V = np.concatenate([V, V[owner[added]]])
-    ties = int((~np.isin(owner[added], draft.forks)).sum())
-    remark = f"{_count(ties, 'bow-tie')} parted: sheets that touch in one point" if ties else ""
-    return _Draft(V, number[fan].reshape(3, m).T.copy()), remark
+    return _Draft(V, number[fan].reshape(3, m).T.copy(), draft.forks), owner[added]

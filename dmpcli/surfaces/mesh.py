@@ -9,7 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.protocol import Connections, Hits, Status, Walks
 from dmpcli.surfaces.roughness import averaged, noise
 from dmpcli.surfaces.topology import Topology
-from dmpcli.surfaces.vectors import cross, dot, length, unit
+from dmpcli.surfaces.vectors import across, cross, dot, length, unit
 
 if TYPE_CHECKING:
     from igl import AABB
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 # Where facets meet at more than this the edge is meant to be sharp: normals are not smoothed
 # across it, and a strip whose normal turns as much within one step is unfolded instead, degrees.
 CREASE = 25.0
+# At the tip of a cone the normal leans off each facet by more than this, degrees, and so many times
+# the angle between facets.
+_LEANING, _TIMES = 5.0, 2.0
+# Nor do normals lean off their facets by more than this anywhere else but in noise, rad.
+_MOST_LEAN = np.radians(14.9)
 # A point beside the border by less than this is on it, mm.
 ON_BORDER = 1e-2
 # However fine the mesh, points this near to it can be of the same surface, mm.
@@ -99,7 +104,24 @@ class Mesh:
             joined &= ~self._ends(apart)
             over = noisy[:, None] | joined[self.F]
             normals = np.where(over[..., None], among[self.F], normals)
-        return unit(normals)
+        normals = unit(normals)
+        flat = self.face_normals[:, None]
+        normals = np.where(self._tips(normals)[..., None], flat, normals)
+        # The rest of what leans too far is brought back: facets too coarse to tell the surface.
+        cosine = dot(normals, flat)
+        leaning = (cosine < np.cos(_MOST_LEAN)) & (self.noise == 0.0)[:, None, None]
+        back = np.cos(_MOST_LEAN) * flat + np.sin(_MOST_LEAN) * across(normals, flat)
+        return np.where(leaning, back, normals)
+
+    def _tips(self, normals: Floats) -> Booleans:
+        """Corners (m, 3) whose normals are not those of the facets about them: the tips of cones.
+
+        About a smooth point a normal leans off a facet by about the angle between facets there.
+        """
+        cosine = dot(normals, self.face_normals[:, None])[..., 0]
+        lean = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        bent = np.maximum(self.dihedrals, np.roll(self.dihedrals, 1, axis=1))
+        return np.asarray((lean > _LEANING + _TIMES * bent) & (self.noise == 0.0)[:, None])
 
     def _ends(self, edges: Booleans) -> Booleans:
         """Vertices, shape (n,), at the ends of edges marked (m, 3)."""
@@ -207,12 +229,6 @@ class Mesh:
     def chordal_error(self) -> float:
         """Estimated largest distance between the mesh and its smooth surface, mm; see `chordal`."""
         return float(self._heights.max())
-
-    @cached_property
-    def steep(self) -> Booleans:
-        """Smooth faces, shape (m,), with a corner whose normal leans off them by over `CREASE`."""
-        lean = dot(self.corner_normals, self.face_normals[:, None])[..., 0].min(axis=1)
-        return np.asarray((lean < np.cos(np.radians(CREASE))) & (self.noise == 0.0))
 
     @cached_property
     def reach(self) -> Floats:

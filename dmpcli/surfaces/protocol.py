@@ -16,7 +16,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 
 
 class Status(IntEnum):
-    """Why a stroke cannot be drawn at a pair; `reason` puts it in words."""
+    """Why a stroke cannot be drawn at a pair; `reason` and `remedy` put it in words."""
 
     DRAWN = 0
     COINCIDENT = 1
@@ -30,26 +30,68 @@ class Status(IntEnum):
     TORN = 9
     MISSED = 10
     TILTED = 11
+    OPPOSITE = 12
 
     @property
     def reason(self) -> str:
-        """One clause for messages."""
-        return _REASONS[self]
+        """One clause for messages: what happened."""
+        return _WORDS[self][0]
+
+    @property
+    def remedy(self) -> str:
+        """One clause for messages: what to do."""
+        return _WORDS[self][1]
+
+    @property
+    def said(self) -> str:
+        """Reason and remedy."""
+        return f"{self.reason}; {self.remedy}"
 
 
-_REASONS = {
-    Status.DRAWN: "drawn",
-    Status.COINCIDENT: "start and goal are one point",
-    Status.OTHER_COMPONENT: "start and goal are on parts of the mesh that are not joined",
-    Status.OTHER_SIDE: "the other side of a thin wall is nearer",
-    Status.NO_GEODESIC: "no geodesic from start to goal was found",
-    Status.BORDER: "the stroke leaves the mesh or crosses a hole, or an edge where sheets touch",
-    Status.FOLDED: "the chart folds: the stroke swings wider than the surface's curvature allows",
-    Status.LOST: "the surface has a gap or a step beside the stroke",
-    Status.NOISY: "the stroke crosses a crease of a noisy scan; smooth the scan first",
-    Status.TORN: "the stroke is torn at a corner or a step of the mesh; keep it off there",
-    Status.MISSED: "the stroke misses its start or goal by over 0.01 mm; move them a little",
-    Status.TILTED: "normals lean off their facets by over 25°; the mesh is too coarse there",
+_WORDS = {
+    Status.DRAWN: ("drawn", "nothing is to be done"),
+    Status.COINCIDENT: ("start and goal are one point", "set them apart"),
+    Status.OTHER_COMPONENT: (
+        "start and goal are on parts of the mesh that are not joined",
+        "give both on one part, or join the parts in the mesh",
+    ),
+    Status.OTHER_SIDE: (
+        "start, goal or the stroke between is nearest to the other side of a thin wall",
+        "move start and goal towards the tool, and keep the stroke off the wall's rim",
+    ),
+    Status.NO_GEODESIC: (
+        "no geodesic leads from start to goal, in any heading: a corner, hole or gap is between",
+        "move start or goal so that the way is clear",
+    ),
+    Status.BORDER: (
+        "the stroke leaves the mesh or crosses a hole, or an edge where sheets touch",
+        "move start and goal inwards, or draw until there with --on-border clip",
+    ),
+    Status.FOLDED: (
+        "the chart folds: the stroke swings wider than the surface's curvature allows",
+        "move start and goal to where the surface is flatter, or off its rounded rims",
+    ),
+    Status.LOST: (
+        "the surface has a gap or a step beside the stroke",
+        "keep the stroke off there, or mend the mesh",
+    ),
+    Status.NOISY: ("the stroke crosses a crease of a noisy scan", "smooth the scan first"),
+    Status.TORN: (
+        "the stroke is torn at a corner or a step of the mesh, on whose sides it goes on apart",
+        "move start and goal so that it keeps off there",
+    ),
+    Status.MISSED: (
+        "the stroke misses its start or goal by over 0.01 mm",
+        "move them a little, off the edges of the mesh",
+    ),
+    Status.TILTED: (
+        "normals lean off their facets by over 25°",
+        "mesh the part more finely there",
+    ),
+    Status.OPPOSITE: (
+        "start and goal are opposite points of the sphere, so that every heading leads there",
+        "move one of them a little, to where the stroke is to run",
+    ),
 }
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces import stepping, unfolding
+from dmpcli.surfaces import all_headings, stepping, unfolding
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.vectors import across, cross, dot, length
+from dmpcli.surfaces.vectors import across, cross, dot, length, turned
 
 # Steps of the centre line are no longer than this, mm, and there are at least four.
 STEP = 6.5
@@ -141,7 +141,8 @@ def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
 
     A secant step in the heading, whose lever is the width by which neighbouring geodesics spread
     (the Jacobi field), and the tangential miss in the length. Where that does not converge the
-    best of a fan of headings is corrected instead.
+    best of a fan of headings is corrected instead; from facet to facet all headings are looked
+    through (`all_headings`), so that what is not hit has no straight line to it.
 
     Returns
     -------
@@ -156,8 +157,9 @@ def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     found, ends, miss = _corrected(mesh, aim, shot, stands_off)
     missed = np.flatnonzero(miss > HIT)
     if len(missed):
-        fan = _best_of_fan(mesh, aim.rows(missed), shot)
-        again, there, less = _corrected(mesh, fan, shot, stands_off[missed])
+        choose = _best_of_fan if shot is by_steps else _of_all_headings
+        chosen = choose(mesh, aim.rows(missed), shot)
+        again, there, less = _corrected(mesh, chosen, shot, stands_off[missed])
         better = less <= HIT
         rows = missed[better]
         found.direction[rows], found.length[rows] = again.direction[better], again.length[better]
@@ -206,6 +208,22 @@ def _corrected(mesh: Mesh, aim: Aim, shot: Shot, stands_off: Floats) -> tuple[Ai
         trial.direction, trial.length = heading[on], size[on]
         lever, turn, side = lever[on], turn[on], side_now[on]
     return best, ends, miss
+
+
+def corrected(mesh: Mesh, aim: Aim) -> tuple[Aim, Ends, Booleans]:
+    """Correct shots along the smooth normal from where they aim, and no others; see `hit`."""
+    found, ends, miss = _corrected(mesh, aim, by_steps, mesh.reach[mesh.search(aim.goal)[1]])
+    return found, ends, miss <= HIT
+
+
+def _of_all_headings(mesh: Mesh, aim: Aim, _shot: Shot) -> Aim:
+    """Aim along the shortest straight lines over the facets, where there are any."""
+    heading, size, found = all_headings.find(mesh, aim.origin, aim.goal)
+    chosen = aim.rows(np.arange(len(size)))
+    flat = aim.sign * mesh.face_normals[mesh.search(aim.origin)[1]]
+    heading = across(turned(heading, flat, aim.normal), aim.normal)
+    chosen.direction[found], chosen.length[found, 0] = heading[found], size[found]
+    return chosen
 
 
 def _best_of_fan(mesh: Mesh, aim: Aim, shot: Shot) -> Aim:

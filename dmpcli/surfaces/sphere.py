@@ -60,7 +60,7 @@ class Sphere:
         angle = np.arctan2(sine, dot(a, b))
         size = self.radius * angle[..., 0]
         opposite = np.pi - angle[..., 0] < OPPOSITE
-        status = np.where(opposite, Status.NO_GEODESIC, Status.DRAWN)
+        status = np.where(opposite, Status.OPPOSITE, Status.DRAWN)
         return Connections(across(b - a, a), size, np.where(size > 0.0, status, Status.COINCIDENT))
 
     def charts(

@@ -135,6 +135,7 @@ def test_a_stroke_over_the_border_is_refused_or_clipped(learned, tmp_path):
     done = run(learned, "-o", tmp_path / "t", *edge, *surface)
     assert done.exit_code == 3, done.stderr
     assert "leaves the mesh or crosses a hole" in done.stderr
+    assert "move start and goal inwards" in done.stderr
     assert not (tmp_path / "t").exists()
     done = run(learned, "-o", tmp_path / "t", *edge, *surface, "--on-border", "clip")
     assert done.exit_code == 0, done.stderr
@@ -202,6 +203,7 @@ def test_many_pairs_on_a_mesh_equal_each_alone_and_bad_ones_are_named(learned, t
     status = read(tmp_path / "b" / "pairs.parquet").columns["status"]
     assert list(status[:2]) == ["ok", "ok"]
     assert "leaves the mesh" in status[2]
+    assert "move start and goal inwards" in status[2]
 
 
 @pytest.mark.parametrize(

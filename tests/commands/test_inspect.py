@@ -200,6 +200,7 @@ def test_what_mending_did_to_a_mesh_is_told_and_the_rest_refused(tmp_path):
     [
         ("part.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\n", "a STEP file"),
         ("part.glb", b"glTF\2\0\0\0\x0c\0\0\0", "a GLB file"),
+        ("part.gltf", b'{"asset": {"version": "2.0"}, "meshes": []}', "a glTF file"),
         ("part.dae", b"<?xml version='1.0'?>\n<COLLADA>", "a DAE file"),
     ],
 )

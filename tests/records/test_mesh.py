@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from dmpcli.errors import InputError
 from dmpcli.records import mesh
 from dmpcli.records.streams import Source
+from dmpcli.surfaces.mesh import Mesh
 from tests.records.meshes import box, grid, obj, written
 
 KINDS = {
@@ -272,6 +273,25 @@ def test_solids_that_share_an_edge_are_read_whole():
     assert (of["pieces"], of["volume"]) == (2, pytest.approx(12_000.0))
 
 
+def test_a_moebius_strip_is_cut_and_what_lies_beside_it_is_whole():
+    V, F = moebius()
+    boxed, faces = box()
+    found = mended(np.concatenate([V, boxed + 200.0]), np.concatenate([F, faces + len(V)]))
+    told = [remark for remark in found.remarks if "one-sided" in remark]
+    assert len(told) == 1
+    assert "cut along 1 edge, the first at" in told[0]
+    surface = Mesh(found.V, found.F)
+    assert len(found.F) == len(F) + len(faces)
+    neighbours = surface.topology.neighbours
+    assert (neighbours > -2).all()
+    for face, edge in zip(*np.nonzero(neighbours >= 0), strict=True):
+        a, b = found.F[face, edge], found.F[face, (edge + 1) % 3]
+        other = found.F[neighbours[face, edge]]
+        assert (b, a) in zip(other, np.roll(other, -1), strict=True)
+    assert len(surface.slits) >= 1
+    assert sorted(surface.outward) == [0.0, 1.0]
+
+
 # What is not safe to mend is refused by name.
 
 
@@ -298,7 +318,6 @@ def changed(array, where, value):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (obj(*moebius()), "is one-sided somewhere, like a Möbius strip"),
         (
             obj(changed(V, (12, 1), np.nan), F),
             "has a vertex at (-30, nan, ",

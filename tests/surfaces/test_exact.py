@@ -132,10 +132,11 @@ def test_closed_strokes_take_their_plane_s_axes_and_know_their_goal(name):
 def test_what_has_no_geodesic_is_named():
     ball, bar = SURFACES["sphere"], SURFACES["cylinder"]
     top = CENTRE + np.array([[0.0, 0.0, 150.0]])
-    assert ball.connect(top, 2 * CENTRE - top).status[0] == Status.NO_GEODESIC
+    assert ball.connect(top, 2 * CENTRE - top).status[0] == Status.OPPOSITE
     assert ball.connect(top, top).status[0] == Status.COINCIDENT
     on_bar = bar.closest(top).position
     assert bar.connect(on_bar, on_bar).status[0] == Status.COINCIDENT
     lift = ball.charts(top, top + [[50.0, 0.0, 0.0]]).lift(np.array([[[5.0, 240.0, 0.0]]]))
     assert lift.status[0] == Status.FOLDED
     assert len({status.reason for status in Status}) == len(Status)
+    assert len({status.remedy for status in Status}) == len(Status)

@@ -89,18 +89,24 @@ def cone(half_angle, sides=40, size=60.0):
     return Mesh(np.vstack([[[0.0, 0.0, 0.0]], rim]), F)
 
 
-def test_normals_near_the_tip_of_a_cone_lean_off_its_facets():
-    blunt, sharp = cone(80.0), cone(50.0)
-    assert not blunt.steep.any()
-    assert sharp.steep.all()
-    for mesh, right in ((blunt, Status.DRAWN), (sharp, Status.TILTED)):
-        face = np.zeros((1, 5), dtype=np.int64)
-        position = mesh.corners[:1, :1] + 0.01 * (mesh.corners[:1].mean(axis=1) * np.ones((5, 1)))
-        normal = mesh.smooth_normals(position[0], face[0])[None]
-        u = np.zeros((1, 5, 3)) + 1.0
-        feet = Feet(u, position, normal, face, np.ones((1, 5)), np.zeros((1, 5), dtype=bool))
-        nowhere = np.zeros((1, 3))
-        assert refusals(mesh, feet, nowhere, nowhere, nowhere)[0] == right
+def test_normals_at_the_tip_of_a_cone_are_those_of_its_facets():
+    for mesh in (cone(80.0), cone(50.0)):
+        lean = np.sum(mesh.corner_normals * mesh.face_normals[:, None], axis=-1)
+        assert lean.min() >= np.cos(np.radians(11.0))
+    np.testing.assert_allclose(mesh.corner_normals[:, 0], mesh.face_normals, atol=1e-12)
+    # Facets so coarse that the tip could be a rounded one.
+    coarse = cone(50.0, 12)
+    lean = np.degrees(np.arccos(np.sum(coarse.corner_normals * coarse.face_normals[:, None], -1)))
+    assert lean.max() == pytest.approx(14.9)
+
+
+def test_a_normal_that_leans_off_its_facet_is_refused():
+    mesh, feet = sheet()
+    for degrees, right in ((24.0, Status.DRAWN), (26.0, Status.TILTED)):
+        a = np.radians(degrees)
+        normal = feet.normal.copy()
+        normal[0, 90] = [np.sin(a), 0.0, np.cos(a)]
+        assert status(mesh, replace(feet, normal=normal)) == right
 
 
 def test_a_line_shorter_than_its_chord_is_found_out():
