@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.registration import from_pairs, onto_surface
+from dmpcli.surfaces.registration import Part, from_pairs, onto_surface, starts_near
 from tests.records.meshes import box, grid
 
 BUMPY = grid(41, 90.0, lambda x, y: 6.0 * np.sin(x * 2 * np.pi / 90) * np.cos(y * 2 * np.pi / 80))
@@ -33,14 +33,9 @@ def motion(rng, angle=None, shift=500.0):
     return Rotation.from_rotvec(turn).as_matrix(), rng.uniform(-shift, shift, 3)
 
 
-def closest_on(V, F):
-    surface = Mesh(V, F)
-
-    def closest(points):
-        hits = surface.closest(points)
-        return hits.position, hits.normal
-
-    return closest
+def laid(points, V, F, R, t):
+    """The pose found near another."""
+    return onto_surface(points, Part.of(Mesh(V, F)), starts_near(points, R, t))
 
 
 def near(R, t, centre, rng, angle, shift):
@@ -81,7 +76,7 @@ def test_the_residuals_of_noisy_pairs_are_those_of_scipy():
     found = from_pairs(part, noisy)
     _, distance = Rotation.align_vectors(noisy - noisy.mean(axis=0), part - part.mean(axis=0))
     assert found.rms == pytest.approx(distance / 3.0)
-    assert 0.02 < found.uncertainty < 0.2
+    assert 0.05 < found.uncertainty < 0.4
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.5])
@@ -108,9 +103,7 @@ def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
     V, F = box((100.0, 60.0, 40.0)) if kind == "box" else BUMPY
     points = touched_on(V, F, 40, rng)
     R, t = motion(rng)
-    found = onto_surface(
-        points @ R.T + t, closest_on(V, F), *near(R, t, V.mean(axis=0), rng, 0.08, 4.0)
-    )
+    found = laid(points @ R.T + t, V, F, *near(R, t, V.mean(axis=0), rng, 0.08, 4.0))
     back = V @ found.rotation.T + found.position
     np.testing.assert_allclose(back, V @ R.T + t, atol=1e-6)
     assert found.residual.max() < 1e-6
@@ -119,19 +112,18 @@ def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
 def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
-    closest = closest_on(V, F)
     errors, told = [], []
     for _ in range(30):
         points = touched_on(V, F, 60, rng)
         R, t = motion(rng)
         noisy = points @ R.T + t + 0.05 * rng.standard_normal(points.shape)
-        found = onto_surface(noisy, closest, *near(R, t, V.mean(axis=0), rng, 0.05, 3.0))
+        found = laid(noisy, V, F, *near(R, t, V.mean(axis=0), rng, 0.05, 3.0))
         moved = points @ found.rotation.T + found.position - (points @ R.T + t)
         errors.append(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         told.append(found.uncertainty)
         assert found.rms == pytest.approx(0.05, rel=0.35)
-    assert np.median(errors) < 3.0 * np.median(told)
-    assert np.median(errors) < 0.1
+    assert np.mean(np.array(errors) <= told) >= 0.9
+    assert np.median(told) < 0.4
 
 
 def test_a_mistouched_point_is_told_and_hardly_moves_the_part():
@@ -142,7 +134,7 @@ def test_a_mistouched_point_is_told_and_hardly_moves_the_part():
     noisy = points @ R.T + t + 0.02 * rng.standard_normal(points.shape)
     top = int(np.argmax(points[:, 2]))
     noisy[top] += 8.0 * R[:, 2]
-    found = onto_surface(noisy, closest_on(V, F), *near(R, t, np.zeros(3), rng, 0.05, 3.0))
+    found = laid(noisy, V, F, *near(R, t, np.zeros(3), rng, 0.05, 3.0))
     assert int(np.argmax(found.residual)) == top
     assert found.residual[top] == pytest.approx(8.0, abs=0.2)
     assert np.median(found.residual) < 0.03
@@ -179,7 +171,7 @@ def test_a_part_that_can_slide_under_the_points_is_refused_with_its_motions(mesh
     V, F = mesh()
     points = touched_on(V, F, 60, rng)
     with pytest.raises(InputError) as error:
-        onto_surface(points, closest_on(V, F), np.eye(3), np.array([0.01, 0.0, 0.01]))
+        laid(points, V, F, np.eye(3), np.array([0.01, 0.0, 0.01]))
     named = str(error.value).split("free: it ")[1].split("; ")
     assert len(named) == len(free) + 1
     for said, expected in zip(named[:-1], free, strict=True):
@@ -192,7 +184,7 @@ def test_a_box_touched_on_one_face_only_is_refused():
     top = np.flatnonzero((V[F][:, :, 2] > 19.0).all(axis=1))
     points = touched_on(V, F, 30, rng, top) * [0.8, 0.8, 1.0]
     with pytest.raises(InputError, match=r"slides along .*slides along .*turns about"):
-        onto_surface(points, closest_on(V, F), np.eye(3), np.zeros(3))
+        laid(points, V, F, np.eye(3), np.zeros(3))
 
 
 def test_motions_are_named_in_the_base_frame():
@@ -201,7 +193,7 @@ def test_motions_are_named_in_the_base_frame():
     R = Rotation.from_euler("y", 90, degrees=True).as_matrix()
     points = touched_on(V, F, 60, rng) @ R.T + [0.0, 30.0, 200.0]
     with pytest.raises(InputError) as error:
-        onto_surface(points, closest_on(V, F), R, np.array([0.0, 30.0, 200.0]))
+        laid(points, V, F, R, np.array([0.0, 30.0, 200.0]))
     slide, turn, _ = str(error.value).split("; ")
     assert slide.endswith("slides along (1.00, 0.00, 0.00)")
     assert turn.startswith("turns about (1.00, 0.00, 0.00) through (")
@@ -212,4 +204,4 @@ def test_motions_are_named_in_the_base_frame():
 def test_six_touched_points_are_too_few():
     V, F = BUMPY
     with pytest.raises(InputError, match="6 touched points"):
-        onto_surface(V[:6], closest_on(V, F), np.eye(3), np.zeros(3))
+        laid(V[:6], V, F, np.eye(3), np.zeros(3))
