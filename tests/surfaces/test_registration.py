@@ -9,40 +9,23 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.registration import Part, from_pairs, onto_surface, starts_near
+from dmpcli.surfaces.registration import (
+    Part,
+    from_pairs,
+    onto_surface,
+    starts_anywhere,
+    starts_near,
+)
 from tests.records.meshes import box, grid
+from tests.surfaces.registration_trial import loaded, motion, near, touched_on, trial
 
 BUMPY = grid(41, 90.0, lambda x, y: 6.0 * np.sin(x * 2 * np.pi / 90) * np.cos(y * 2 * np.pi / 80))
 SEEDS = st.integers(0, 10_000)
 
 
-def touched_on(V, F, count, rng, faces=None):
-    """Points spread over a mesh, or over some of its faces, by area."""
-    F = F if faces is None else F[faces]
-    a, b, c = np.moveaxis(V[F], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    chosen = rng.choice(len(F), count, p=area / area.sum())
-    return np.einsum("ki,kij->kj", rng.dirichlet([1.0, 1.0, 1.0], count), V[F[chosen]])
-
-
-def motion(rng, angle=None, shift=500.0):
-    """A random rigid motion: R, t."""
-    turn = Rotation.random(rng=rng).as_rotvec()
-    if angle is not None:
-        turn *= angle / np.linalg.norm(turn)
-    return Rotation.from_rotvec(turn).as_matrix(), rng.uniform(-shift, shift, 3)
-
-
 def laid(points, V, F, R, t):
     """The pose found near another."""
     return onto_surface(points, Part.of(Mesh(V, F)), starts_near(points, R, t))
-
-
-def near(R, t, centre, rng, angle, shift):
-    """A pose that is off by a turn about the part's centre and a shift."""
-    turn, _ = motion(rng, angle)
-    step = rng.standard_normal(3)
-    return turn @ R, R @ centre + t - turn @ R @ centre + shift * step / np.linalg.norm(step)
 
 
 @settings(max_examples=50, deadline=None)
@@ -96,7 +79,7 @@ def test_too_few_pairs_one_point_and_a_wrong_unit_are_refused():
         from_pairs(part / 1000.0, part)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(SEEDS, st.sampled_from(["box", "bumpy"]))
 def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
     rng = np.random.default_rng(seed)
@@ -113,7 +96,7 @@ def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
     errors, told = [], []
-    for _ in range(30):
+    for _ in range(12):
         points = touched_on(V, F, 60, rng)
         R, t = motion(rng)
         noisy = points @ R.T + t + 0.05 * rng.standard_normal(points.shape)
@@ -205,3 +188,65 @@ def test_six_touched_points_are_too_few():
     V, F = BUMPY
     with pytest.raises(InputError, match="6 touched points"):
         laid(V[:6], V, F, np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "least"),
+    [("wedge", 8, 0.0), ("bracket", 12, 0.2), ("wedge", 20, 0.75), ("bracket", 30, 0.85)],
+)
+def test_accepted_poses_are_right_and_within_their_bound(name, count, least):
+    """`benchmarks/registration.py` in small."""
+    V, F, part = loaded(name)
+    found = [trial(V, F, part, count, seed) for seed in range(8)]
+    good = [one for one in found if one.verdict == "accepted"]
+    assert all(one.error < 1.5 for one in good)
+    assert sum(one.error > one.bound for one in good) <= 1
+    assert len(good) >= least * len(found)
+
+
+def test_in_all_orientations_the_pose_is_found_without_a_start():
+    V, F, part = loaded("bracket")
+    found = [trial(V, F, part, 24, seed, anywhere=True) for seed in range(2)]
+    assert [one.verdict for one in found] == ["accepted"] * 2
+    assert max(one.error for one in found) < 1.0
+
+
+def test_a_box_in_all_orientations_has_a_rival_that_looks_the_same():
+    rng = np.random.default_rng(11)
+    V, F = box((100.0, 60.0, 40.0))
+    part = Part.of(Mesh(V, F))
+    points = touched_on(V, F, 40, rng) + 0.05 * rng.standard_normal((40, 3))
+    found = onto_surface(points, part, starts_anywhere(points, part))
+    assert found.rival.near
+    assert np.degrees(found.rival.turned) == pytest.approx(180.0, abs=0.5)
+    assert found.rival.difference < 0.3
+    near_it = laid(points, V, F, np.eye(3), np.ones(3))
+    assert near_it.rival is None or not near_it.rival.near
+
+
+def test_directions_of_approach_tell_sides_of_a_thin_plate_apart():
+    """A plate of 3 mm touched on top and along its upper edge: it may also lie 3 mm higher."""
+    rng = np.random.default_rng(12)
+    V, F = wedge_plate()
+    top = np.flatnonzero(np.isclose(V[F][:, :, 2].min(axis=1), 3.0))
+    sides = np.flatnonzero(np.ptp(V[F][:, :, 2], axis=1) > 1.0)
+    points = np.concatenate([touched_on(V, F, 9, rng, top), touched_on(V, F, 10, rng, sides)])
+    points[9:, 2] = 2.98
+    normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (9, 1)), np.full((10, 3), np.nan)])
+    part = Part.of(Mesh(V, F))
+    low = np.array([0.0, 0.0, 3.0])
+    noisy = points + 0.03 * rng.standard_normal(points.shape)
+    blind = onto_surface(noisy, part, starts_near(noisy, np.eye(3), low))
+    assert blind.rival.near
+    assert blind.rival.apart == pytest.approx(3.0, abs=0.3)
+    told = onto_surface(noisy, part, starts_near(noisy, np.eye(3), low), -normals)
+    assert told.directed
+    assert told.rival is None or not told.rival.near
+    np.testing.assert_allclose(told.position, 0.0, atol=0.3)
+
+
+def wedge_plate():
+    made = trimesh.Trimesh(
+        [(x, y, z) for z in (0.0, 3.0) for x, y in ((0, 0), (90, 10), (70, 60), (-5, 40))]
+    ).convex_hull
+    return np.array(made.vertices, dtype=float), np.array(made.faces)
