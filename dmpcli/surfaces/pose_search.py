@@ -18,10 +18,10 @@ Closest = Callable[[Floats], tuple[Floats, Floats]]
 """From points (n, 3) to the closest points of the part and its unit normals there, part frame."""
 
 _STEPS, LAST_STEPS = 12, 60
-_KEPT = 0.4
-"""Share of the starts that go on after the first steps, by their fit ..."""
-_MOST_LAST = 48
-"""... and how many go on to the end."""
+_MOST_KEPT = 48
+"""Poses that go on to the end after the first steps, the best that differ ..."""
+_SAME = 0.05
+"""... by more than this at a touched point, mm."""
 _SETTLED = 1e-9
 """A step that changes the sum of squares by less than this part of it is the last."""
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
@@ -147,11 +147,30 @@ def descend(touched: Floats, closest: Closest, starts: Poses) -> tuple[Poses, Fl
         Sums of squared distances, mm².
     """
     poses, squares = descended(touched, closest, starts, _STEPS)
-    order = np.argsort(squares, kind="stable")
-    order = order[: min(max(int(_KEPT * len(order)), 8), _MOST_LAST)]
-    poses, squares = descended(touched, closest, poses[order])
+    kept = _distinct(poses.to_part(touched), np.argsort(squares, kind="stable"))
+    poses, squares = descended(touched, closest, poses[kept])
     order = np.argsort(squares, kind="stable")
     return poses[order], squares[order]
+
+
+def _distinct(placed: Floats, order: Integers) -> Integers:
+    """Choose up to `_MOST_KEPT` of B poses in their order, none twice.
+
+    Where many starts lead to one pose, the best of all would be that pose alone.
+
+    Parameters
+    ----------
+    placed : array, shape (B, n, 3)
+        The touched points in the part's frame, mm.
+    order : array of int, shape (B,)
+    """
+    kept: list[int] = []
+    while len(order) and len(kept) < _MOST_KEPT:
+        first = int(order[0])
+        kept.append(first)
+        apart = np.sum((placed[order] - placed[first]) ** 2, axis=2).max(axis=1)
+        order = order[apart > _SAME**2]
+    return np.array(kept)
 
 
 def descended(
@@ -179,7 +198,7 @@ def descended(
     squares : array, shape (B,)
         Sums of squared distances, mm².
     """
-    R, t = starts.rotation.copy(), starts.position.copy()
+    R, t = np.array(starts.rotation, dtype=float), np.array(starts.position, dtype=float)
     centre = touched.mean(axis=0)
     radius = float(np.sqrt(np.mean(np.sum((touched - centre) ** 2, axis=1))))
     distance, gradient = signed(Poses(R, t).to_part(touched), closest)
