@@ -8,6 +8,7 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.records.pose import Pose
+    from dmpcli.records.streams import Source
     from dmpcli.surfaces.protocol import Surface
 
 
@@ -97,6 +98,7 @@ def read(
         A file that cannot be read or is none of them, a wrong pose or unit; by name.
     """
     from dmpcli.commands.messages import tell
+    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
     from dmpcli.records import streams
@@ -112,8 +114,10 @@ def read(
         placed, pose_source = pose_file.parse(pose, "--surface-pose")
         if pose_source is None:
             options["surface_pose"] = [float(word) for word in pose.split()]
+            warn_of_angles("--surface-pose", options["surface_pose"][3:])
         else:
             inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
+            unit = _agreed(pose_source, source, unit)
     waiting = mesh_file.waiting(source)
     if waiting is not None:
         tell(waiting, quiet)
@@ -128,3 +132,33 @@ def read(
     else:
         kind, shape = surface_file.kind(found), found
     return SurfaceInput(path, shape, kind, source.sha256, unit or "mm", placed, options, inputs)
+
+
+def _agreed(pose: "Source", part: "Source", unit: str | None) -> str | None:
+    """Return the part's unit, of which the pose file and the option must agree.
+
+    Raises
+    ------
+    InputError
+        They contradict one another: the part would be drawn on in another size than it has there.
+    """
+    from dmpcli.commands.messages import warn
+    from dmpcli.records import pose as pose_file
+
+    if part.content.lstrip()[:1] == b"{":  # no mesh: always in mm
+        return unit
+    _, file = pose_file.decode(pose)
+    touched = [entry["sha256"] for entry in file.inputs if entry.get("role") == "part"]
+    if touched and part.sha256 not in touched:
+        warn(
+            f"{pose.name}: was found for another file than {part.name}; if the part or its axes "
+            "are others, register it anew"
+        )
+    if file.unit is None:
+        return unit
+    if unit is not None and unit != file.unit:
+        raise InputError(
+            f"--surface-unit {unit}: {pose.name} was found with the part in {file.unit}; leave "
+            "--surface-unit out, or register the part anew with --unit"
+        )
+    return file.unit
