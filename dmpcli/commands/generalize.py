@@ -380,7 +380,8 @@ def _judge(
         table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill, where)
     bad = np.flatnonzero(~table.good)
     if stop and len(bad):
-        refused = bad[0] in rows[verdict.upright | verdict.deep | verdict.stretched]
+        shape = verdict.upright | verdict.deep | verdict.stretched
+        refused = bad[0] in rows[shape & ~verdict.far]
         raise (RefusedError if refused else InputError)(f"{table.name}: {table.status[bad[0]]}")
     tell_of_stretch(verdict, np.flatnonzero(verdict.admitted), skill, table.name)
 

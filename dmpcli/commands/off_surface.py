@@ -19,7 +19,7 @@ def distances(off: Mapping[str, float]) -> str:
     off : mapping
         mm by what messages call the point.
     """
-    order = sorted(off, key=lambda name: off[name])
+    order = sorted(off, key=lambda name: round(off[name], 3))
     first = f"{order[0]} lies {off[order[0]]:.3f}"
     return f"{' and '.join([first, *(f'{name} {off[name]:.3f}' for name in order[1:])])} mm off"
 
