@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 _ALIKE = 4.0
 """Where two poses differ by less than this many RMS residuals everywhere, no touch tells them."""
 _ALIKE_MM = 0.2
+_OUTLIER, _OUTLIER_MM = 8.0, 0.2
+"""A residual beyond so many medians, and so many mm, is told."""
 
 
 def rough_pose(
@@ -57,6 +59,7 @@ def registered(
     points: "Touched", part: "Part", scale: float, start: "Pose | None", limit: float
 ) -> "Registration":
     """Find the pose: by pairs, about a start, or without one in all orientations."""
+    from dmpcli.surfaces.pose_search import joined
     from dmpcli.surfaces.registration import (
         from_pairs,
         onto_surface,
@@ -66,12 +69,28 @@ def registered(
 
     if points.paired.all():
         return from_pairs(scale * points.part, points.base, part.extreme)
-    starts = (
-        starts_anywhere(points.base, part)
-        if start is None
-        else starts_near(points.base, start.rotation, start.position)
+    if start is None:
+        starts = starts_anywhere(points.base, part)
+        return onto_surface(points.base, part, starts, points.approach, limit)
+    starts = starts_near(points.base, start.rotation, start.position)
+    found = onto_surface(points.base, part, starts, points.approach, limit)
+    if not _beyond(*_moved(found, start, points.base)):
+        return found
+    # So far from its start a pose is no longer the one that was meant: all others are its rivals.
+    starts = joined(
+        starts_near(points.base, found.rotation, found.position),
+        starts_anywhere(points.base, part),
     )
     return onto_surface(points.base, part, starts, points.approach, limit)
+
+
+def _beyond(moved: float, turned: float) -> bool:
+    """Whether a pose is so far from its start, mm and degrees, that the start was bad."""
+    from math import degrees
+
+    from dmpcli.surfaces.registration import START_SHIFT, START_TURN
+
+    return moved > 2.0 * START_SHIFT or turned > 2.0 * degrees(START_TURN)
 
 
 def refuse_unsure(
@@ -135,6 +154,15 @@ def _residual(result: "Registration", points: "Touched", limit: float) -> str | 
             else "give a better --initial or px py pz for three points, "
         )
         + "or raise the limit"
+        + ("" if not result.outside else f"; {_tip(result)}")
+    )
+
+
+def _tip(result: "Registration") -> str:
+    side = "outside" if result.outside > 0.0 else "inside"
+    return (
+        f"the points lie {abs(result.outside):.2f} mm {side} the part on average, as the middle of "
+        "a round tip does by its radius: touch with a point, or take the radius off"
     )
 
 
@@ -170,7 +198,7 @@ def _uncertain(result: "Registration", points: "Touched", limit: float) -> str |
         f"{points.table.name}: these points tell the pose only to {result.uncertainty:.2g} mm at "
         f"some point of the part (95 %), more than --max-error {limit:g};\nleast certain, the part "
         f"{result.conditioning.weakest}: touch more points where that would show, or raise the "
-        "limit"
+        "limit" + ("" if not result.outside else f"; {_tip(result)}")
     )
 
 
@@ -261,6 +289,8 @@ def tell_of(
     result: "Registration", points: "Touched", output: str, start: "Pose | None", quiet: bool
 ) -> None:
     """Say how well a pose fits, how certain it is, and what comes next to it."""
+    import numpy as np
+
     from dmpcli.commands.messages import tell, warn
 
     conditioning = result.conditioning
@@ -285,6 +315,20 @@ def tell_of(
             f"{points.table.name}: the directions of approach point out of the part in every pose "
             "that fits, and are not used; ax ay az (or the tool's axis of rx ry rz) point into it"
         )
+    if result.outside:
+        warn(f"{points.table.name}: {_tip(result)}")
+    worst, middle = int(np.argmax(result.residual)), float(np.median(result.residual))
+    if result.residual[worst] > max(_OUTLIER * middle, _OUTLIER_MM):
+        warn(
+            f"{points.table.name}: {points.table.at(worst)}: lies {result.residual[worst]:.3f} mm "
+            f"off the part, the median of all {middle:.3f} mm: touch it again"
+        )
     if start is not None:
         moved, turned = _moved(result, start, points.base)
+        if _beyond(moved, turned):
+            warn(
+                f"{points.table.name}: the start is bad, {moved:.1f} mm and {turned:.1f}° from the "
+                "pose that was found; no other in all orientations fits as well"
+            )
+            return
         tell(f"{moved:.1f} mm and {turned:.1f}° from the start", quiet)

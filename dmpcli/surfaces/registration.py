@@ -47,6 +47,10 @@ _FACING = 0.3
 """Cosine above which a touch came out of the part rather than onto it; edges blur their normals."""
 _MOST_ASTRAY = 0.2
 """Share of touches out of the part from which on the directions, not the pose, are wrong."""
+_LEAST_SHIFT = 0.1
+"""mm. Points that lie less to one side of the surface on average are not told of."""
+_SMALL = 50.0
+"""Points within this part of the part's size are in another unit, or tell nothing."""
 _PLACES = 2000
 """Faces, the largest, whose middles stand for where a part can be touched."""
 _OUTLIER = 6.0
@@ -105,6 +109,9 @@ class Registration:
         The runner-up; None where no other was found.
     directed : bool
         Whether directions of approach were used: given, and not against the part.
+    outside : float
+        Where all points lie off the surface to one side, their mean distance, mm, positive along
+        its normals; else 0. No motion of the part does that: it is the tip's radius.
     """
 
     rotation: Floats
@@ -115,6 +122,7 @@ class Registration:
     uncertainty: float
     rival: Rival | None = None
     directed: bool = False
+    outside: float = 0.0
 
     @property
     def rms(self) -> float:
@@ -260,6 +268,7 @@ def onto_surface(
             f"{MIN_TOUCHED} at least are needed, spread over all its sides"
         )
     radius_of(touched - touched.mean(axis=0))
+    _refuse_size(touched, part)
     spare = count - 6
     poses, squares = pose_search.descend(touched, part.closest, starts)
     # What fits as well beside the best pose may lead to one that is better yet.
@@ -296,7 +305,36 @@ def onto_surface(
         rival = _rival(part, best, poses[second : second + 1], rms, near)
     rotation, position = best.rotation[0], best.position[0]
     residual = np.abs(distance)
-    return Registration(rotation, position, residual, conditioning, spare, bound, rival, directed)
+    return Registration(
+        rotation,
+        position,
+        residual,
+        conditioning,
+        spare,
+        bound,
+        rival,
+        directed,
+        _one_sided(distance),
+    )
+
+
+def _one_sided(distance: Floats) -> float:
+    """Median of signed distances (n,), mm, where it is beyond doubt; else 0."""
+    middle, spread = float(np.median(distance)), float(np.std(distance))
+    sure = max(_LEAST_SHIFT, 5.0 * spread / np.sqrt(len(distance)))
+    return middle if abs(middle) > sure else 0.0
+
+
+def _refuse_size(touched: Floats, part: Part) -> None:
+    across = float(np.linalg.norm(np.ptp(touched, axis=0)))
+    # No distance between two points of the part is larger than its box's diagonal.
+    most = float(np.linalg.norm(np.ptp(part.extreme, axis=0)))
+    spread = float(np.linalg.norm(touched - touched.mean(axis=0), axis=1).max())
+    if spread > 1.1 * most or across < most / _SMALL:
+        raise InputError(
+            f"the touched points are {across:.4g} mm across, the part {most:.4g} mm: check the "
+            "part's unit of length (--unit), and that x y z are in mm"
+        )
 
 
 def _beside(touched: Floats, part: Part, best: Poses, limit: float) -> tuple[Poses, Floats]:

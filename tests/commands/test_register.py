@@ -1,6 +1,7 @@
 """register at the command line: where a part lies, how well that is known, and what is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,7 +9,12 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.records import pose, streams
+from dmpcli.commands import register_checks
+from dmpcli.errors import RefusedError
+from dmpcli.records import pose, streams, touched
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.pose_search import Poses
+from dmpcli.surfaces.registration import Part, onto_surface
 from tests.records.meshes import box, obj, written
 from tests.surfaces.registration_trial import touched_on, wedge
 
@@ -203,16 +209,53 @@ def test_without_a_guess_all_orientations_are_searched(wedge_lab):
     assert "at every point of the part (95 %)" in done.stderr
 
 
-def test_a_bad_start_is_told_as_a_bad_start_with_the_pose_to_paste(wedge_lab):
-    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", 900, 300, -200, 2.2, 1.0, -1)
-    assert done.exit_code == 3
-    assert "on.csv: the start is bad: --initial is " in done.stderr
-    assert not (wedge_lab / "pose.json").exists()
-    words = done.stderr.split("give --initial ")[1].split(",")[0].split()
-    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *words)
-    assert done.exit_code == 0, done.stderr
+def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedge_lab):
+    bad = [900, 300, -200, 2.2, 1.0, -1]
+    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *bad, "-q")
+    assert done.exit_code == 0
+    assert re.search(r"on\.csv: the start is bad, [0-9.]+ mm and [0-9.]+° from", done.stderr)
     assert_wedge(wedge_lab)
-    assert "from the start" in done.stderr
+
+
+def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(wedge_lab):
+    points = touched.read(streams.read(wedge_lab / "on.csv"))
+    part = Part.of(Mesh(*wedge()))
+    start = pose.Pose.of(np.array([446.0, -61.0, 18.0, 2.6, 1.3, -2.5]))
+    alone = Poses(start.rotation[None], start.position[None])
+    stuck = onto_surface(points.base, part, alone)
+    with pytest.raises(RefusedError, match=r"on\.csv: the start is bad: --initial is ") as error:
+        register_checks.refuse_unsure(stuck, points, part, start, 1.0, 1.5, True)
+    pasted = str(error.value).split("give --initial ")[1].split(",")[0].split()
+    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *pasted)
+    assert done.exit_code == 0, done.stderr
+    assert "start is bad" not in done.stderr
+    assert_wedge(wedge_lab)
+
+
+def test_a_part_that_looks_the_same_turned_over_is_refused_from_a_bad_start(lab):
+    over = Rotation.from_matrix(R @ np.diag([-1.0, 0.6, -0.6]) @ R.T @ R).as_euler("XYZ")
+    done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", 480, -60, 0, *over)
+    assert done.exit_code == 3
+    assert "the part looks the same in both" in done.stderr
+
+
+def test_a_residual_that_stands_out_is_told_by_row(lab):
+    rows = np.loadtxt(lab / "touched.csv", delimiter=",", skiprows=1)
+    top = int(np.argmax((rows - T) @ R[:, 2]))
+    rows[top] += 0.7 * R[:, 2]
+    table(lab / "odd.csv", rows)
+    done = run("part.stl", "odd.csv", "-o", "pose.json", "--initial", *NEAR, "-q")
+    assert done.exit_code == 0
+    assert f"odd.csv: line {top + 2}: lies 0." in done.stderr
+    assert "touch it again" in done.stderr
+
+
+def test_touches_in_metres_are_refused_for_their_unit(wedge_lab):
+    rows = np.loadtxt(wedge_lab / "on.csv", delimiter=",", skiprows=1) / 1000.0
+    table(wedge_lab / "m.csv", rows)
+    done = run("wedge.stl", "m.csv", "-o", "pose.json")
+    assert done.exit_code == 2
+    assert "check the part's unit of length (--unit), and that x y z are in mm" in done.stderr
 
 
 def test_a_part_that_looks_the_same_turned_over_needs_a_start(lab):

@@ -250,3 +250,22 @@ def wedge_plate():
         [(x, y, z) for z in (0.0, 3.0) for x, y in ((0, 0), (90, 10), (70, 60), (-5, 40))]
     ).convex_hull
     return np.array(made.vertices, dtype=float), np.array(made.faces)
+
+
+def test_the_radius_of_a_round_tip_is_seen():
+    rng = np.random.default_rng(13)
+    V, F, part = loaded("wedge")
+    points = touched_on(V, F, 40, rng)
+    outwards = part.closest(points)[1]
+    found = onto_surface(points + 0.5 * outwards, part, starts_near(points, np.eye(3), np.ones(3)))
+    assert found.outside == pytest.approx(0.5, abs=0.1)
+    bare = onto_surface(points, part, starts_near(points, np.eye(3), np.ones(3)))
+    assert bare.outside == 0.0
+
+
+@pytest.mark.parametrize("scale", [0.001, 10.0, 1000.0])
+def test_points_of_another_size_than_the_part_are_refused_for_their_unit(scale):
+    V, F, part = loaded("wedge")
+    points = scale * touched_on(V, F, 20, np.random.default_rng(14))
+    with pytest.raises(InputError, match="check the part's unit of length"):
+        onto_surface(points, part, starts_near(points, np.eye(3), np.zeros(3)))
