@@ -29,6 +29,7 @@ def one_pair(
 
     from dmpcli import rotations
     from dmpcli.commands.options import within
+    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.primitives.generalization import Pairs
     from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
 
@@ -36,6 +37,7 @@ def one_pair(
         if angles is None:
             return None
         within(name, angles, LARGEST_ANGLE)
+        warn_of_angles(name, angles)
         return rotations.from_euler(np.array([angles]))
 
     return PairTable(

@@ -69,12 +69,7 @@ def _hint(at: "Floats", read: "SurfaceInput", in_part: bool) -> str | None:
     from dmpcli.records.mesh import UNITS
     from dmpcli.surfaces.placement import slips
 
-    position, angles = np.zeros(3), np.zeros(3)
-    if read.pose is not None:
-        position, angles = read.pose.position, rotations.to_euler(read.pose.rotation)
-        said = read.options.get("surface_pose")
-        if said is not None:  # Euler angles of more than half a turn are others once read
-            angles = np.array(said[3:])
+    position, angles = np.reshape(read.said_pose or np.zeros(6), (2, 3))
     others = {u: UNITS[u] / UNITS[read.unit] for u in UNITS if read.kind == "mesh"}
     scales = tuple(scale for scale in others.values() if scale != 1.0)
     given = (at - position) @ rotations.from_euler(angles) if in_part else at
@@ -90,10 +85,10 @@ def _hint(at: "Floats", read: "SurfaceInput", in_part: bool) -> str | None:
         "other frame": "as points of the base they lie on it: leave --in part out?"
         if in_part
         else "as points of the part they lie on it: give --in part?",
-        "pose in m": "with X Y Z of --surface-pose times 1000 they lie on it: is it in m, not mm?",
-        "pose in degrees": "with RX RY RZ of --surface-pose as degrees they lie on it: give rad "
+        "pose in m": "with X Y Z of the pose times 1000 they lie on it: is it in m, not mm?",
+        "pose in degrees": "with RX RY RZ of the pose as degrees they lie on it: give rad "
         f"({_shown(np.radians(angles), 5)})?",
-        "pose in both": "with --surface-pose in m and degrees they lie on it: give mm and rad "
+        "pose in both": "with the pose in m and degrees they lie on it: give mm and rad "
         f"({_shown(1000.0 * position)} {_shown(np.radians(angles), 5)})?",
     }[best.kind]
 

@@ -8,6 +8,9 @@ import typer
 from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError
 
+LARGE = 100_000
+"""Faces on which the search takes some seconds."""
+
 
 def command(
     part: Annotated[
@@ -80,6 +83,8 @@ def command(
     for remark in found.remarks:
         tell(f"{part}: {remark}", quiet)
     tell(f"{part}: {mesh.summary(found)}", quiet)
+    if len(found.F) > LARGE:
+        tell(f"{part}: the search on {len(found.F)} faces takes a while", quiet)
     part_shape = Part.of(Mesh(found.V, found.F))
     scale = mesh.UNITS[unit]
     with about(str(touched)):

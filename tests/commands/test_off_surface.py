@@ -113,6 +113,15 @@ def test_angles_of_more_than_a_turn_are_doubted_aloud(lab):
     assert "if these are degrees, give 0.2 -0.1 1.3" in done.stderr
 
 
+def test_a_pose_file_in_degrees_is_doubted_and_hinted_at(lab):
+    (lab / "hand.json").write_text(json.dumps({"position": SIX[:3], "rotation": DEGREES[3:]}))
+    words = [*ends(IN_BASE), "--surface", "part.obj", "--surface-pose", "hand.json"]
+    done = drawn(*words)
+    assert done.exit_code == 2
+    assert "hand.json: 11.4592 -5.72958 74.4845 is more than a turn as rad" in done.stderr
+    assert "as degrees they lie on it: give rad (0.2" in done.stderr
+
+
 def test_ends_in_the_parts_axes_are_those_in_the_base(lab):
     assert drawn(*ends(IN_BASE), "--surface", "part.obj", *POSE).exit_code == 0
     base = position(lab)
