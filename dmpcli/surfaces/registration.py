@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -24,6 +23,7 @@ from dmpcli.surfaces.conditioning import (
     radius_of,
     refuse_unseen,
 )
+from dmpcli.surfaces.mistouched import steadied
 from dmpcli.surfaces.pose_search import Closest, Poses
 
 if TYPE_CHECKING:
@@ -53,8 +53,6 @@ _SMALL = 50.0
 """Points within this part of the part's size are in another unit, or tell nothing."""
 _PLACES = 2000
 """Faces, the largest, whose middles stand for where a part can be touched."""
-_OUTLIER = 6.0
-"""Residuals beyond this many robust standard deviations are kept from dominating the pose."""
 
 
 @dataclass(frozen=True)
@@ -279,7 +277,7 @@ def onto_surface(
         poses, squares = pose_search.joined(poses, found), np.concatenate([squares, fit])
     cost, directed = _directed(touched, part, poses, squares, approach, limit)
     first = int(np.argmin(cost))
-    best = _steadied(touched, part, poses[first : first + 1])
+    best = steadied(touched, part.closest, poses[first : first + 1])
     distance = pose_search.signed(best.to_part(touched), part.closest)[0][0]
     conditioning = _conditioning_at(touched, part, best)
     refuse_unseen(conditioning, "touch sides that face other ways too")
@@ -388,65 +386,4 @@ def _rival(part: Part, best: Poses, other: Poses, rms: float, near: bool) -> Riv
         near,
         places[worst],
         float(off[worst]),
-    )
-
-
-def _steadied(touched: Floats, part: Part, best: Poses) -> Poses:
-    """Keep mistouched points from dominating a pose: each shall show in its own residual."""
-    rotation, position = best.rotation[0], best.position[0]
-    centre = touched.mean(axis=0)
-    arms = touched - centre
-    radius = radius_of(arms)
-
-    def offsets(x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distances of the points turned by x[3:]/radius about c and moved by x[:3].
-
-        With them their gradients and the turned arms, base axes.
-        """
-        turned = arms @ rotations.exp(x[3:] / radius).T
-        in_part = (turned + centre + x[:3] - position) @ rotation
-        distance, gradient = pose_search.signed(in_part, part.closest)
-        return distance, gradient @ rotation.T, turned
-
-    def distances(x: Floats) -> Floats:
-        return offsets(x)[0]
-
-    def jacobian(x: Floats) -> Floats:
-        _, gradient, turned = offsets(x)
-        turn = np.cross(turned, gradient) @ _left_jacobian(x[3:] / radius) / radius
-        return np.concatenate([gradient, turn], axis=1)
-
-    x = np.zeros(6)
-    for _ in range(2):
-        now = np.abs(distances(x))
-        # The median of absolute deviations, as a normal distribution's standard deviation.
-        scale = max(1.4826 * float(np.median(now)), pose_bound.LEAST_NOISE)
-        if now.max() <= _OUTLIER * scale:
-            break
-        x = least_squares(
-            distances,
-            x,
-            jac=jacobian,
-            loss="soft_l1",
-            f_scale=scale,
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-            max_nfev=200,
-        ).x
-    # The touched points were moved onto the part: the part moves the other way.
-    R = rotations.exp(-x[3:] / radius)
-    return Poses((R @ rotation)[None], (R @ (position - x[:3] - centre) + centre)[None])
-
-
-def _left_jacobian(rotvec: Floats) -> Floats:
-    """J of Exp(ω + δ) = Exp(J δ) Exp(ω) to first order (G. Chirikjian, 2012, ch. 10)."""
-    angle = float(np.linalg.norm(rotvec))
-    K = rotations.skew(rotvec)
-    if angle < 1e-4:
-        return np.asarray(np.eye(3) + K / 2.0 + K @ K / 6.0)
-    return np.asarray(
-        np.eye(3)
-        + (1.0 - np.cos(angle)) / angle**2 * K
-        + (angle - np.sin(angle)) / angle**3 * (K @ K)
     )

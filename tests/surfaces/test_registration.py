@@ -96,7 +96,7 @@ def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
     errors, told = [], []
-    for _ in range(12):
+    for _ in range(6):
         points = touched_on(V, F, 60, rng)
         R, t = motion(rng)
         noisy = points @ R.T + t + 0.05 * rng.standard_normal(points.shape)
@@ -105,7 +105,7 @@ def test_noise_averages_out_as_the_uncertainty_says():
         errors.append(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         told.append(found.uncertainty)
         assert found.rms == pytest.approx(0.05, rel=0.35)
-    assert np.mean(np.array(errors) <= told) >= 0.9
+    assert np.sum(np.array(errors) > told) <= 1
     assert np.median(told) < 0.4
 
 
