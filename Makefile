@@ -99,6 +99,7 @@ bench: $(VENV)/installed
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
 	$(BIN)/python -m benchmarks.taught_surfaces
+	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
 

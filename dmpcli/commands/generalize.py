@@ -10,12 +10,16 @@ from dmpcli.errors import InputError, RefusedError, counted
 
 if TYPE_CHECKING:
     from dmpcli.batch.job import Task
+    from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.primitives.drawing import Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
     from dmpcli.records.record import Provenance
     from dmpcli.surfaces.protocol import Surface
+
+_PLACED = 100
+"""Pairs off the surface that are told where it is instead."""
 
 
 def command(
@@ -33,6 +37,14 @@ def command(
     ],
     start: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New start, mm.")] = None,
     goal: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New goal, mm.")] = None,
+    in_: Annotated[
+        str,
+        typer.Option(
+            "--in",
+            metavar="base|part",
+            help="Axes of start, goal and pairs: the base's, or the surface's own.",
+        ),
+    ] = "base",
     reproduce: Annotated[
         bool, typer.Option("--reproduce", help="At the demonstrated start and goal.")
     ] = False,
@@ -145,6 +157,7 @@ def command(
     from dmpcli.commands import batches, surface_input
     from dmpcli.commands.generalize_inputs import (
         facing_tool,
+        in_base,
         one_pair,
         reach_of,
         style_of,
@@ -191,6 +204,7 @@ def command(
         },
     )
     surface_input.check_options(surface, surface_pose, surface_unit)
+    _check_frame(in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import nursery
@@ -202,11 +216,11 @@ def command(
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
     options = settings.model_dump()
-    found = None
+    found = read = None
     if surface is not None:
-        options |= {"surface_unit": surface_unit or "mm", "on_border": on_border}
         read = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
-        found, options, inputs = read.surface, options | read.options, inputs + read.inputs
+        options |= {"surface_unit": read.unit, "on_border": on_border} | read.options
+        found, inputs = read.surface, inputs + read.inputs
     reach = reach_of(robot_model, tool, learned.oriented, options, inputs, quiet)
     if pairs is None:
         assert start is not None
@@ -220,6 +234,8 @@ def command(
         table = pair_file.read(pairs_source)
         inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
         options |= wanted.options
+    if in_ == "part":
+        table, options = in_base(table, read), options | {"in": in_}
     _check_asked(learned, table, settings)
     given = None if found is None else facing_tool(found, learned, table, str(surface), quiet)
     style = style_of(settings.style(), learned, given, settings.contact, settings.offset)
@@ -234,7 +250,7 @@ def command(
         )
     if given is not None:
         tell_of_surface(learned, style, given, table, str(surface), quiet)
-    _judge(learned, table, given, settings, style, wanted.stop)
+    _judge(learned, table, given, settings, style, wanted.stop, read, in_ == "part")
     taught = lesson.of_skill(file).facts()
     provenance = Provenance("generalize", options, tuple(inputs), taught)
     task = Task(learned, given, style, on_border, reach)
@@ -263,6 +279,15 @@ def _check_together(
     alone = [name for name, value in of_surface.items() if value is not None]
     if surface is None and alone:
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
+
+
+def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
+    if in_ not in ("base", "part"):
+        raise InputError(f"--in {in_}: must be base or part")
+    if in_ == "part" and surface is None:
+        raise InputError("--in part: the axes of which part? Name it with --surface")
+    if in_ == "part" and reproduce:
+        raise InputError("--reproduce takes the demonstrated ends, in the base; leave --in out")
 
 
 def _check_destination(
@@ -327,11 +352,13 @@ def _judge(
     settings: "GeneralizeSettings",
     style: "Style",
     stop: bool,
+    read: "SurfaceInput | None",
+    in_part: bool,
 ) -> None:
     """Write what stands against a pair into its status; with `stop` the first one ends all."""
     import numpy as np
 
-    from dmpcli.commands.generalize_inputs import ENDS
+    from dmpcli.commands.generalize_inputs import ENDS, where_instead
     from dmpcli.commands.generalize_messages import reason, tell_of_stretch
     from dmpcli.primitives.admission import admit
 
@@ -347,10 +374,14 @@ def _judge(
     for i in np.flatnonzero(~verdict.admitted):
         row = int(rows[i])
         place = f"{table.place(row)}, pair {table.ids[row]}: " if table.name != ENDS else ""
-        table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill)
+        # To place each of very many would take longer than to draw them.
+        few = int(np.count_nonzero(verdict.far[:i])) < _PLACED
+        where = where_instead(table, row, read, in_part) if read is not None and few else None
+        table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill, where)
     bad = np.flatnonzero(~table.good)
     if stop and len(bad):
-        refused = bad[0] in rows[verdict.upright | verdict.deep | verdict.stretched]
+        shape = verdict.upright | verdict.deep | verdict.stretched
+        refused = bad[0] in rows[shape & ~verdict.far]
         raise (RefusedError if refused else InputError)(f"{table.name}: {table.status[bad[0]]}")
     tell_of_stretch(verdict, np.flatnonzero(verdict.admitted), skill, table.name)
 

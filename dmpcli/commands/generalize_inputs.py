@@ -1,11 +1,13 @@
 """What `generalize` reads besides the skill: one pair's ends, the surface, and the arm."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
+    from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.primitives.contact_heights import ContactHeights
     from dmpcli.primitives.drawing import Style
     from dmpcli.primitives.reach import Reach
@@ -27,6 +29,7 @@ def one_pair(
 
     from dmpcli import rotations
     from dmpcli.commands.options import within
+    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.primitives.generalization import Pairs
     from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
 
@@ -34,6 +37,7 @@ def one_pair(
         if angles is None:
             return None
         within(name, angles, LARGEST_ANGLE)
+        warn_of_angles(name, angles)
         return rotations.from_euler(np.array([angles]))
 
     return PairTable(
@@ -49,6 +53,46 @@ def one_pair(
         np.array([np.nan]),
         [OK],
     )
+
+
+def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
+    """Carry pairs that are in the part's own axes into the base frame."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from dmpcli.primitives.generalization import Pairs
+
+    pose = None if read is None else read.pose
+    if pose is None:
+        return table
+
+    def turned(rotation: Any) -> Any:
+        return None if rotation is None else pose.rotation @ rotation
+
+    pairs = table.pairs
+    with np.errstate(invalid="ignore"):  # rows that are not read hold what they held
+        carried = Pairs(
+            pose.to_base(pairs.start),
+            pose.to_base(pairs.goal),
+            turned(pairs.start_rotation),
+            turned(pairs.goal_rotation),
+        )
+    return replace(table, pairs=carried)
+
+
+def where_instead(
+    table: "PairTable", row: int, read: "SurfaceInput", in_part: bool
+) -> Callable[[list[str]], str]:
+    """Return what says of ends of a pair that are off the surface where it is instead."""
+    from dmpcli.commands import off_surface
+
+    def where(ends: list[str]) -> str:
+        at = {"start": table.pairs.start[row], "goal": table.pairs.goal[row]}
+        form = "--{}" if table.name == ENDS else "{}"
+        return off_surface.remedy({end: at[end] for end in ends}, read, in_part, form)
+
+    return where
 
 
 def facing_tool(

@@ -1,5 +1,6 @@
 """What `generalize` says of a skill and of where it is drawn, before and beside the outcome."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,8 +23,27 @@ def mark(skill: "Skill", name: str) -> str | None:
     return None if found is None else marks.text(name, found)
 
 
-def reason(verdict: "Admission", i: int, tolerance: float, skill: "Skill") -> str:
-    """Say what stands against a pair, and what to do."""
+def reason(
+    verdict: "Admission",
+    i: int,
+    tolerance: float,
+    skill: "Skill",
+    where: Callable[[list[str]], str] | None = None,
+) -> str:
+    """Say what stands against a pair, and what to do.
+
+    Parameters
+    ----------
+    verdict : Admission
+    i : int
+        Of the pair.
+    tolerance : float
+        Of start and goal off the surface, mm.
+    skill : Skill
+    where : callable, optional
+        Says of the ends that are off the surface where it is instead.
+    """
+    from dmpcli.commands import off_surface
     from dmpcli.primitives.admission import MOST_SAMPLES
 
     if verdict.coincident[i]:
@@ -36,10 +56,10 @@ def reason(verdict: "Admission", i: int, tolerance: float, skill: "Skill") -> st
     if verdict.endless[i]:
         return f"more than {MOST_SAMPLES} samples; shorten --duration or lower --rate"
     if verdict.far[i]:
-        return (
-            f"start or goal lies {verdict.distance[i]:.3f} mm off the surface, more than "
-            f"--snap-tol {tolerance:g}; move the point, or raise the tolerance"
-        )
+        off = {name: float(verdict.off[i, j]) for j, name in enumerate(("start", "goal"))}
+        off = {name: distance for name, distance in off.items() if distance > tolerance}
+        said = f"{off_surface.distances(off)} the surface, more than --snap-tol {tolerance:g}; "
+        return said + (where(list(off)) if where else "move the point, or raise the tolerance")
     if verdict.upright[i]:
         return (
             "the line from start to goal stands upright on the plane, so that no chart follows; "

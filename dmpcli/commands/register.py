@@ -1,19 +1,15 @@
 """``dmpcli register``: a part and points touched on it in, its pose in the base frame out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from dmpcli.commands.options import Quiet
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.errors import InputError
 
-if TYPE_CHECKING:
-    from dmpcli.arrays import Floats
-    from dmpcli.records.mesh import MeshFile
-    from dmpcli.records.pose import Pose
-    from dmpcli.records.touched import Touched
-    from dmpcli.surfaces.registration import Registration
+LARGE = 100_000
+"""Faces on which the search takes some seconds."""
 
 
 def command(
@@ -26,7 +22,8 @@ def command(
     touched: Annotated[
         Path,
         typer.Argument(
-            help="Touched points: CSV or Parquet with x y z (base frame, mm) [px py pz (part)].",
+            help="Touched points: CSV or Parquet with x y z (base frame, mm) [px py pz (part)] "
+            "[ax ay az (how the tip came) or rx ry rz].",
             show_default=False,
         ),
     ],
@@ -40,21 +37,35 @@ def command(
             help="Rough pose to begin from, mm and rad. Default: that of px py pz, or no motion.",
         ),
     ] = None,
+    guess: Annotated[
+        str,
+        typer.Option(
+            metavar="near|none",
+            help="Search near the rough pose, or with none in all orientations.",
+        ),
+    ] = "near",
     unit: Annotated[
         str, typer.Option(help="Of the part's file and of px py pz: mm, cm, m or in.")
     ] = "mm",
     max_residual: Annotated[
         float, typer.Option(help="Largest distance of a touched point from the part, mm.")
     ] = 1.0,
+    max_error: Annotated[
+        float,
+        typer.Option(help="Largest error left at any point of the part, with 95 %, mm."),
+    ] = 1.5,
     quiet: Quiet = False,
 ) -> None:
     """Find where a part lies from points touched on it."""
+    from dmpcli.commands import register_checks
     from dmpcli.commands.messages import about, tell
+    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.records import mesh, pose, streams
     from dmpcli.records import touched as touched_file
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.registration import LIMIT, Part
 
-    if not max_residual > 0.0:
-        raise InputError(f"--max-residual {max_residual:g}: must be a length above 0")
+    _check(max_residual, max_error, guess, initial)
     streams.check_writable(output)
     sources = {"part": streams.read(part), "touched": streams.read(touched)}
     waiting = mesh.waiting(sources["part"])
@@ -65,14 +76,23 @@ def command(
     rough = None
     if initial is not None:
         rough, source = pose.parse(initial, "--initial")
+        if source is None:
+            warn_of_angles("--initial", [float(word) for word in initial.split()[3:]])
         if source is not None:
             sources["initial"] = source
     for remark in found.remarks:
         tell(f"{part}: {remark}", quiet)
     tell(f"{part}: {mesh.summary(found)}", quiet)
+    if len(found.F) > LARGE:
+        tell(f"{part}: the search on {len(found.F)} faces takes a while", quiet)
+    part_shape = Part.of(Mesh(found.V, found.F))
+    scale = mesh.UNITS[unit]
     with about(str(touched)):
-        result = _registered(found, points, mesh.UNITS[unit], rough)
-    _check_residual(result, points, max_residual)
+        first = register_checks.rough_pose(points, scale, rough, guess)
+        result = register_checks.registered(points, part_shape, scale, first, max_error)
+    register_checks.refuse_unsure(
+        result, points, part_shape, first, max_residual, max_error, initial is not None
+    )
     conditioning = result.conditioning
     content = pose.encode(
         pose.Pose(result.position, result.rotation),
@@ -85,64 +105,22 @@ def command(
             weakest=conditioning.weakest,
             uncertainty=result.uncertainty,
         ),
-        {"unit": unit, "initial": initial if "initial" not in sources else None},
+        {"unit": unit, "initial": initial if "initial" not in sources else None}
+        | ({} if guess == "near" else {"guess": guess})
+        | ({} if max_error == LIMIT else {"max_error": max_error}),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
+        unit,
+        register_checks.runner_up(result),
     )
     streams.write(output, content)
-    tell(
-        f"{output}: {len(result.residual)} points, residual {result.rms:.4f} mm RMS, "
-        f"{result.residual.max():.4f} mm at most; condition number {conditioning.number:.3g}",
-        quiet,
-    )
-    tell(
-        f"least certain, to {result.uncertainty:.2g} mm: the part {conditioning.weakest}",
-        quiet,
-    )
+    register_checks.tell_of(result, points, str(output), first, quiet)
 
 
-def _registered(
-    found: "MeshFile", points: "Touched", scale: float, rough: "Pose | None"
-) -> "Registration":
-    import numpy as np
-
-    from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.registration import from_pairs, onto_surface
-
-    paired = points.paired
-    if paired.all():
-        if rough is not None:
-            raise InputError("every row has px py pz, which give the pose; leave --initial out")
-        return from_pairs(scale * points.part, points.base)
-    rotation, position = np.eye(3), np.zeros(3)
-    if rough is not None:
-        rotation, position = rough.rotation, rough.position
-    elif paired.any():
-        first = from_pairs(scale * points.part[paired], points.base[paired])
-        rotation, position = first.rotation, first.position
-    surface = Mesh(found.V, found.F)
-
-    def closest(at: "Floats") -> "tuple[Floats, Floats]":
-        hits = surface.closest(at)
-        return hits.position, hits.normal
-
-    return onto_surface(points.base, closest, rotation, position)
-
-
-def _check_residual(result: "Registration", points: "Touched", limit: float) -> None:
-    import numpy as np
-
-    worst = int(np.argmax(result.residual))
-    if result.residual[worst] <= limit:
-        return
-    table = points.table
-    raise RefusedError(
-        f"{table.name}: {table.at(worst)}: lies {result.residual[worst]:.3f} mm off the part "
-        f"(median of all {np.median(result.residual):.3f} mm), more than --max-residual "
-        f"{limit:g};\ntouch it again, "
-        + (
-            "check its px py pz, "
-            if points.paired.all()
-            else "give a better --initial or px py pz for three points, "
-        )
-        + "or raise the limit"
-    )
+def _check(max_residual: float, max_error: float, guess: str, initial: str | None) -> None:
+    for option, value in (("--max-residual", max_residual), ("--max-error", max_error)):
+        if not value > 0.0:
+            raise InputError(f"{option} {value:g}: must be a length above 0")
+    if guess not in ("near", "none"):
+        raise InputError(f"--guess {guess}: must be near or none")
+    if guess == "none" and initial is not None:
+        raise InputError("--guess none searches all orientations; leave --initial out")

@@ -13,6 +13,7 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
+    from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.figures.batch import Tables
     from dmpcli.figures.document import Part
     from dmpcli.figures.footing import Ground
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from dmpcli.records.layouts import Layout
 
 _WIDTH = 80
+_SHOWN = 3
 _WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
 
 
@@ -86,9 +88,10 @@ def command(
         repeated=repeated_stamps,
         decimal=decimal,
     )
-    ground, said, normal = None, None, None
+    ground = said = normal = read = None
     if surface is not None:
-        ground, said, normal = _ground(surface, surface_pose, surface_unit, quiet)
+        read = surface_input.read(surface, surface_pose, surface_unit, quiet)
+        ground, said, normal = _ground(read)
     labels = stroke.labels_of(files)
     parts = [
         _part(name, label, normal, form, quiet) for name, label in zip(files, labels, strict=True)
@@ -96,6 +99,8 @@ def command(
     parts = _seen(parts, ground)
     if ground is not None:
         parts = _placed(parts, ground, quiet)
+    if read is not None:
+        _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = many.Sight(document.reference_of(parts), ground, normal)
         parts = _measured(parts, sight, tables, quiet)
@@ -170,17 +175,14 @@ def _batch(folder: Path, label: str, normal: "Floats | None", quiet: bool) -> "P
     return Part(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
 
 
-def _ground(
-    path: Path, pose: str | None, unit: str | None, quiet: bool
-) -> "tuple[Ground, Row, Floats | None]":
-    """Read the surface and place it; also what the report says of it, and a plane's normal."""
-    from dmpcli.commands import surface_input
+def _ground(read: "SurfaceInput") -> "tuple[Ground, Row, Floats | None]":
+    """Return the surface as figures see it, what the report says of it, and a plane's normal."""
     from dmpcli.figures.footing import Ground
     from dmpcli.records.lesson import surface_key
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.plane import Plane
 
-    read = surface_input.read(path, pose, unit, quiet)
+    path = read.path
     found, key = read.surface, surface_key(read.facts)
     if isinstance(found, Mesh):
         return Ground(path.name, found, found.V, found.F, key), read.said, None
@@ -229,6 +231,29 @@ def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
                 advance(len(some))
             done.append(replace(part, strokes=strokes))
     return done
+
+
+def _warn_of_ends(parts: "list[Part]", read: "SurfaceInput") -> None:
+    """Say of strokes that were planned to begin or end off the surface where it is instead."""
+    from dmpcli.commands import off_surface
+    from dmpcli.commands.messages import warn
+    from dmpcli.figures.document import FAR
+
+    lines = []
+    for stroke in (stroke for part in parts for stroke in part.strokes):
+        lies = stroke.footing
+        if lies is None:
+            continue
+        ends = {"start": (lies.start_off, stroke.start), "goal": (lies.goal_off, stroke.goal)}
+        far = {name: end for name, end in ends.items() if end[0] > FAR}
+        if not far:
+            continue
+        said = off_surface.distances({name: off for name, (off, _) in far.items()})
+        lines.append((stroke.label, said, {name: point for name, (_, point) in far.items()}))
+    for label, said, points in lines[:_SHOWN]:
+        warn(f"{label}: {said} {read.path.name}; {off_surface.remedy(points, read)}")
+    if len(lines) > _SHOWN:
+        warn(f"and {len(lines) - _SHOWN} more strokes that begin or end off {read.path.name}")
 
 
 @contextlib.contextmanager

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.records.pose import Pose
+    from dmpcli.records.pose import Pose, PoseFile
+    from dmpcli.records.streams import Source
     from dmpcli.surfaces.protocol import Surface
 
 
@@ -31,6 +32,8 @@ class SurfaceInput:
         For provenance: ``surface_pose`` where it was given as numbers.
     inputs : list of dict
         For provenance: role and sha256 of the files that were read.
+    said_pose : list of float
+        X Y Z RX RY RZ as given or as in the pose file, not yet brought to one turn; or empty.
     """
 
     path: Path
@@ -41,6 +44,7 @@ class SurfaceInput:
     pose: "Pose | None"
     options: dict[str, Any] = field(default_factory=dict)
     inputs: list[dict[str, str]] = field(default_factory=list)
+    said_pose: list[float] = field(default_factory=list)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -97,6 +101,7 @@ def read(
         A file that cannot be read or is none of them, a wrong pose or unit; by name.
     """
     from dmpcli.commands.messages import tell
+    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
     from dmpcli.records import streams
@@ -107,13 +112,17 @@ def read(
     source = streams.read(path)
     inputs = [{"role": "surface", "sha256": source.sha256}]
     options: dict[str, Any] = {}
-    placed = None
+    placed, said = None, []
     if pose is not None:
         placed, pose_source = pose_file.parse(pose, "--surface-pose")
         if pose_source is None:
-            options["surface_pose"] = [float(word) for word in pose.split()]
+            said = options["surface_pose"] = [float(word) for word in pose.split()]
         else:
             inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
+            _, file = pose_file.decode(pose_source)
+            said = [*file.position, *file.rotation]
+            unit = _agreed(pose_source.name, file, source, unit)
+        warn_of_angles("--surface-pose" if pose_source is None else pose_source.name, said[3:])
     waiting = mesh_file.waiting(source)
     if waiting is not None:
         tell(waiting, quiet)
@@ -127,4 +136,34 @@ def read(
             tell(f"{path}: {mesh_file.summary(found, shape)}", quiet)
     else:
         kind, shape = surface_file.kind(found), found
-    return SurfaceInput(path, shape, kind, source.sha256, unit or "mm", placed, options, inputs)
+    return SurfaceInput(
+        path, shape, kind, source.sha256, unit or "mm", placed, options, inputs, said
+    )
+
+
+def _agreed(name: str, file: "PoseFile", part: "Source", unit: str | None) -> str | None:
+    """Return the part's unit, of which the pose file and the option must agree.
+
+    Raises
+    ------
+    InputError
+        They contradict one another: the part would be drawn on in another size than it has there.
+    """
+    from dmpcli.commands.messages import warn
+
+    if part.content.lstrip()[:1] == b"{":  # no mesh: always in mm
+        return unit
+    touched = [entry["sha256"] for entry in file.inputs if entry.get("role") == "part"]
+    if touched and part.sha256 not in touched:
+        warn(
+            f"{name}: was found for another file than {part.name}; if the part or its axes "
+            "are others, register it anew"
+        )
+    if file.unit is None:
+        return unit
+    if unit is not None and unit != file.unit:
+        raise InputError(
+            f"--surface-unit {unit}: {name} was found with the part in {file.unit}; leave "
+            "--surface-unit out, or register the part anew with --unit"
+        )
+    return file.unit

@@ -50,8 +50,8 @@ class Admission:
         The stroke would dig into the named surface.
     stretched : array of bool
         The stroke would be stretched beyond all likeness, and that was not asked for.
-    distance : array, shape (B,)
-        The larger distance of start and goal from the given surface, mm; 0 without one.
+    off : array, shape (B, 2)
+        Distances of start and goal from the given surface, mm; 0 without one.
     depth : array, shape (B,)
         How far the stroke would go into the named surface, mm.
     stretch : array, shape (B,)
@@ -65,9 +65,14 @@ class Admission:
     endless: Booleans
     deep: Booleans
     stretched: Booleans
-    distance: Floats
+    off: Floats
     depth: Floats
     stretch: Floats
+
+    @property
+    def distance(self) -> Floats:
+        """The larger distance of start and goal from the given surface, mm, shape (B,)."""
+        return np.asarray(self.off.max(axis=1, initial=0.0))
 
     @property
     def admitted(self) -> Booleans:
@@ -105,10 +110,10 @@ def admit(
     difference = pairs.goal - pairs.start
     length = np.linalg.norm(difference, axis=1)
     coincident = np.zeros(len(pairs), dtype=bool) if skill.closed else length < COINCIDENT
-    distance = np.zeros(len(pairs))
+    off = np.zeros((len(pairs), 2))
     if given is not None:
         ends = (given.closest(pairs.start).distance, given.closest(pairs.goal).distance)
-        distance = np.maximum(*ends)
+        off = np.stack(ends, axis=1)
     upright = np.zeros(len(pairs), dtype=bool)
     # Only planes can be missed: on a curved surface the geodesic tells the direction.
     flat = given is None or isinstance(given, Plane)
@@ -131,13 +136,13 @@ def admit(
     stretched &= ~coincident & (not style.allow_stretch)
     return Admission(
         coincident,
-        distance > tolerance,
+        off.max(axis=1, initial=0.0) > tolerance,
         upright,
         short,
         endless,
         deep,
         stretched,
-        distance,
+        off,
         depth,
         stretch,
     )

@@ -392,7 +392,8 @@ def states_of(batch: Batch) -> tuple[dict[str, int], list[dict[str, Any]]]:
     reason = pc.replace_substring_regex(status, place, "")
     # A cell as it stands in the table is each row's own.
     reason = pc.replace_substring_regex(reason, r"^(column '[^']*'): .* (is )", r"\1 \2")
-    reason = pc.replace_substring_regex(reason, r" lies [0-9.]+ mm off", " lies off")
+    far = r"^(?:start|goal|start or goal) lies [0-9.]+(?: and [a-z]+ [0-9.]+)? mm off ([^;]*).*$"
+    reason = pc.replace_substring_regex(reason, far, r"start or goal lies off \1")
     words = reason.dictionary_encode()
     code = np.asarray(words.indices)
     names = words.dictionary.to_pylist()

@@ -65,7 +65,19 @@ class Conditioning(Part):
     ]
     weakest: Annotated[str, Field(description="the least certain motion, in the base frame")]
     uncertainty: Annotated[
-        Distance, Field(description="standard deviation of that motion, mm at the touched points")
+        Distance,
+        Field(description="bound on the displacement at any point of the part, with 95 %, mm"),
+    ]
+
+
+class RunnerUp(Part):
+    """The pose that fits best but one, among those that differ from it."""
+
+    position: Annotated[Three, Field(description="as the pose's own, mm")]
+    rotation: Annotated[Three, Field(description="as the pose's own, rad")]
+    rms: Annotated[Distance, Field(description="of the distances that it leaves, mm")]
+    apart: Annotated[
+        Distance, Field(description="largest distance between the two at any point of the part, mm")
     ]
 
 
@@ -81,6 +93,11 @@ class PoseFile(Part):
     rotation: Annotated[Three, Field(description=f"Euler angles, {EULER}, rad")]
     residuals: Residuals | None = None
     conditioning: Conditioning | None = None
+    unit: Annotated[
+        str | None,
+        Field(pattern="^(mm|cm|m|in)$", description="of the part's file; the pose is in mm"),
+    ] = None
+    runner_up: RunnerUp | None = None
     options: dict[str, Any] = Field(default_factory=dict)
     inputs: list[dict[str, str]] = Field(default_factory=list)
 
@@ -91,6 +108,8 @@ def encode(
     conditioning: Conditioning | None = None,
     options: dict[str, Any] | None = None,
     inputs: list[dict[str, str]] | None = None,
+    unit: str | None = None,
+    runner_up: RunnerUp | None = None,
 ) -> bytes:
     """Return a pose as the bytes of its JSON file."""
     document = PoseFile(
@@ -98,6 +117,8 @@ def encode(
         rotation=rotations.to_euler(pose.rotation).tolist(),
         residuals=residuals,
         conditioning=conditioning,
+        unit=unit,
+        runner_up=runner_up,
         options=options or {},
         inputs=inputs or [],
     )

@@ -4,14 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dmpcli import rotations
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import tables
-from dmpcli.records.schemas import POSITION
+from dmpcli.records.schemas import EULER_ANGLES, POSITION
 from dmpcli.records.streams import Source
 from dmpcli.records.tables import Table
 
 PART = ("px", "py", "pz")
+APPROACH = ("ax", "ay", "az")
+"""Direction in which the tip came to the point, base axes, of any length."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +29,16 @@ class Touched:
         Base frame, mm.
     part : array, shape (n, 3)
         The same points in the part's frame, in the file's unit; NaN where the file does not say.
+    approach : array, shape (n, 3), or None
+        Unit directions in which the tip came to the points, base frame: those of ``ax ay az``,
+        else the tool's axis by ``rx ry rz``; NaN where the file does not say, None where it nowhere
+        does.
     """
 
     table: Table
     base: Floats
     part: Floats
+    approach: Floats | None = None
 
     @property
     def paired(self) -> Booleans:
@@ -39,7 +47,7 @@ class Touched:
 
 
 def read(source: Source) -> Touched:
-    """Read a table with ``x y z`` and, where points of the part are known, ``px py pz``.
+    """Read a table with ``x y z`` and, where they are known, ``px py pz`` and ``ax ay az``.
 
     Raises
     ------
@@ -48,22 +56,46 @@ def read(source: Source) -> Touched:
     """
     table = tables.read(source)
     base = np.stack([table.numbers(name) for name in POSITION], axis=1)
-    present = [name in table.columns for name in PART]
+    part, approach = _three(table, PART, "a point of the part"), _approach(table)
+    return Touched(table, base, np.full_like(base, np.nan) if part is None else part, approach)
+
+
+def _approach(table: Table) -> Floats | None:
+    said = _three(table, APPROACH, "a direction of approach")
+    if said is None:
+        if not all(name in table.columns for name in EULER_ANGLES):
+            return None
+        angles = np.stack([table.floats(name) for name in EULER_ANGLES], axis=1)
+        known = np.asarray(np.isfinite(angles).all(axis=1))
+        return rotations.from_euler(np.where(known[:, None], angles, np.nan))[..., 2]
+    length = np.linalg.norm(said, axis=1, keepdims=True)
+    if (length == 0.0).any():
+        row = int(np.flatnonzero(length[:, 0] == 0.0)[0])
+        raise InputError(
+            f"{table.name}: columns {', '.join(APPROACH)}, {table.at(row)}: a direction has a "
+            "length; leave the three cells empty where it is not known"
+        )
+    return np.asarray(said / length)
+
+
+def _three(table: Table, names: tuple[str, ...], what: str) -> Floats | None:
+    """Three columns, shape (n, 3), NaN where all three cells are empty; None without them."""
+    present = [name in table.columns for name in names]
     if not any(present):
-        return Touched(table, base, np.full_like(base, np.nan))
+        return None
     if not all(present):
         raise InputError(
-            f"{source.name}: column {PART[present.index(False)]!r} is missing; a point of the part "
-            f"needs all of {', '.join(PART)}"
+            f"{table.name}: column {names[present.index(False)]!r} is missing; {what} "
+            f"needs all of {', '.join(names)}"
         )
-    part = np.stack([table.floats(name) for name in PART], axis=1)
-    empty = np.stack([table.empty(name) for name in PART], axis=1)
-    bad = ~np.isfinite(part) & ~np.asarray(empty.all(axis=1))[:, None]
+    values = np.stack([table.floats(name) for name in names], axis=1)
+    empty = np.stack([table.empty(name) for name in names], axis=1)
+    bad = ~np.isfinite(values) & ~np.asarray(empty.all(axis=1))[:, None]
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise InputError(
-            f"{source.name}: column {PART[column]!r}, {table.at(row)}: "
-            f"{table.shown(PART[column], row)} is not a finite number; fill in the point of the "
-            "part, or leave all three cells empty"
+            f"{table.name}: column {names[column]!r}, {table.at(row)}: "
+            f"{table.shown(names[column], row)} is not a finite number; fill in {what}, or leave "
+            "all three cells empty"
         )
-    return Touched(table, base, part)
+    return values

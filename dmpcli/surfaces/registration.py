@@ -1,98 +1,89 @@
 """Where a part lies: its pose in the base frame from points touched on it.
 
 Point pairs are solved in closed form (W. Kabsch, Acta Crystallographica A32 (1976) 922; scipy's
-`Rotation.align_vectors`). Points touched anywhere are laid onto the surface by iterative closest
-points with distances measured to the surface, not to points of it (Y. Chen, G. Medioni, Image and
-Vision Computing 10 (1992) 145): scipy's `least_squares` minimizes them, with a loss that a
-mistouched point cannot dominate. docs/registration.md says why no ready ICP was taken.
-
-Conditioning. A small motion of the part, v about the touched points' centre c and the rotation
-vector ω, changes the distance of the point p by n · (v + ω × (p - c)). These rows, with ω in units
-of 1/radius, have singular values, the gains: how much the distances change, RMS, for a motion that
-moves the touched points by about 1. A gain of zero is a motion that the points cannot see.
+`Rotation.align_vectors`). Points touched anywhere are laid onto the surface from many starts
+(`pose_search`); the best pose stands only with its rival and the bound on its error beside it
+(`pose_bound`). docs/registration.md says why no ready ICP was taken.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.surfaces import pose_bound, pose_search
+from dmpcli.surfaces.conditioning import (
+    Conditioning,
+    conditioning_of,
+    radius_of,
+    refuse_unseen,
+)
+from dmpcli.surfaces.mistouched import steadied
+from dmpcli.surfaces.pose_search import Closest, Poses
 
-MIN_GAIN = 0.015
-"""A motion that changes the distances by less than this part of itself is taken for unseen.
-
-The facets of round meshes alone give 0.001 to 0.008; rocking on a saddle of radius 120 mm 0.03.
-"""
+if TYPE_CHECKING:
+    from dmpcli.surfaces.mesh import Mesh
 
 MIN_PAIRS = 3
 MIN_TOUCHED = 7
 """Six points fix a pose and leave nothing to judge it by."""
 
-Closest = Callable[[Floats], tuple[Floats, Floats]]
-"""From points (n, 3) to the closest points of the part and its unit normals there, part frame."""
+LIMIT = 1.5
+"""mm. Poses that differ by more than this somewhere on the part are different ones."""
+
+START_SHIFT, START_TURN = 15.0, np.radians(15.0)
+"""How far about a rough pose the starts are spread, mm and rad ..."""
+STARTS = 200
+"""... and how many they are."""
+ORIENTATIONS = 768
+"""Starts over all orientations, about 22° from one to the next."""
+
+_FACING = 0.3
+"""Cosine above which a touch came out of the part rather than onto it; edges blur their normals."""
+_MOST_ASTRAY = 0.2
+"""Share of touches out of the part from which on the directions, not the pose, are wrong."""
+_LEAST_SHIFT = 0.1
+"""mm. Points that lie less to one side of the surface on average are not told of."""
+_SMALL = 50.0
+"""Points within this part of the part's size are in another unit, or tell nothing."""
+_PLACES = 2000
+"""Faces, the largest, whose middles stand for where a part can be touched."""
 
 
 @dataclass(frozen=True)
-class Conditioning:
-    """How well touched points hold a part.
+class Rival:
+    """Another pose that fits the touched points best but one.
 
     Attributes
     ----------
-    gains : array, shape (6,)
-        Descending.
-    motions : array, shape (6, 6)
-        Row i is the unit motion (v, ω·radius) of gain i, base axes.
-    centre : array, shape (3,)
-        Of the touched points, mm.
-    radius : float
-        RMS distance of the touched points from it, mm.
+    rotation, position : array, shape (3, 3) and (3,)
+    rms : float
+        Of its distances, mm.
+    apart : float
+        Largest distance from the best pose at any point of the part, mm.
+    turned : float
+        Angle between the two, rad.
+    near : bool
+        Whether it fits nearly as well: it is not out of question with `pose_bound.SURE`.
+    place : array, shape (3,)
+        Point of the part in the best pose, base frame, mm, furthest from the other's surface.
+    difference : float
+        How far, mm.
     """
 
-    gains: Floats
-    motions: Floats
-    centre: Floats
-    radius: float
-
-    @property
-    def number(self) -> float:
-        """Largest gain over smallest; infinite where a motion is not seen at all."""
-        return float(self.gains[0] / self.gains[-1]) if self.gains[-1] > 0.0 else np.inf
-
-    @property
-    def weakest(self) -> str:
-        """The motion of the smallest gain, in words."""
-        return self._named(self.motions[-1])
-
-    def free(self) -> list[str]:
-        """Return in words the motions that the points do not see, slides first."""
-        unseen = self.motions[self.gains < MIN_GAIN]
-        if len(unseen) == 0:
-            return []
-        # Their mixture is arbitrary: take the pure slides out of it, and what is left turns.
-        mixing, turning, _ = np.linalg.svd(unseen[:, 3:])
-        turns = int(np.sum(turning > 0.1))
-        return [
-            self._named(mixing[:, i] @ unseen) for i in [*range(turns, len(unseen)), *range(turns)]
-        ]
-
-    def _named(self, motion: Floats) -> str:
-        slide, turn = motion[:3], motion[3:] / self.radius
-        if np.linalg.norm(motion[3:]) < 0.1:
-            return f"slides along {_shown(_canonical(slide), 2)}"
-        square = float(turn @ turn)
-        foot = self.centre + np.cross(turn, slide) / square
-        pitch = float(turn @ slide) / square
-        named = f"turns about {_shown(_canonical(turn), 2)} through {_shown(foot, 1)} mm"
-        return (
-            named
-            if abs(pitch) < 0.1 * self.radius
-            else f"{named}, advancing {pitch:.3g} mm per rad"
-        )
+    rotation: Floats
+    position: Floats
+    rms: float
+    apart: float
+    turned: float
+    near: bool
+    place: Floats
+    difference: float
 
 
 @dataclass(frozen=True)
@@ -110,6 +101,15 @@ class Registration:
     conditioning : Conditioning
     spare : int
         Degrees of freedom that are left to the residuals.
+    uncertainty : float
+        Bound on the displacement at any point of the part, mm, with `pose_bound.LIKELY`.
+    rival : Rival or None
+        The runner-up; None where no other was found.
+    directed : bool
+        Whether directions of approach were used: given, and not against the part.
+    outside : float
+        Where all points lie off the surface to one side, their mean distance, mm, positive along
+        its normals; else 0. No motion of the part does that: it is the tip's radius.
     """
 
     rotation: Floats
@@ -117,20 +117,18 @@ class Registration:
     residual: Floats
     conditioning: Conditioning
     spare: int
+    uncertainty: float
+    rival: Rival | None = None
+    directed: bool = False
+    outside: float = 0.0
 
     @property
     def rms(self) -> float:
         """Root mean square of the residuals, mm."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
-    @property
-    def uncertainty(self) -> float:
-        """Standard deviation along the weakest motion, mm at the touched points."""
-        spread = np.sqrt(np.sum(self.residual**2) / self.spare)
-        return float(spread / (self.conditioning.gains[-1] * np.sqrt(len(self.residual))))
 
-
-def from_pairs(part: Floats, touched: Floats) -> Registration:
+def from_pairs(part: Floats, touched: Floats, extreme: Floats | None = None) -> Registration:
     """Find the pose that carries points of the part onto touched points.
 
     Parameters
@@ -139,6 +137,8 @@ def from_pairs(part: Floats, touched: Floats) -> Registration:
         Part frame, mm.
     touched : array, shape (n, 3)
         The same points in the base frame, mm.
+    extreme : array, shape (m, 3), optional
+        Points of the part that span its hull; without them those touched.
 
     Returns
     -------
@@ -153,8 +153,8 @@ def from_pairs(part: Floats, touched: Floats) -> Registration:
         raise InputError(f"{len(part)} point pairs; a pose needs {MIN_PAIRS} at least")
     centre = touched.mean(axis=0)
     normals = np.broadcast_to(np.eye(3), (len(touched), 3, 3)).reshape(-1, 3)
-    conditioning = _conditioning(np.repeat(touched, 3, axis=0), normals, len(touched))
-    _refuse_unseen(conditioning, "touch points that do not lie on one line")
+    conditioning = conditioning_of(np.repeat(touched, 3, axis=0), normals, len(touched))
+    refuse_unseen(conditioning, "touch points that do not lie on one line")
     origin = part.mean(axis=0)
     spread = float(np.sqrt(np.mean(np.sum((part - origin) ** 2, axis=1))))
     if not 0.5 < conditioning.radius / max(spread, 1e-12) < 2.0:
@@ -165,11 +165,76 @@ def from_pairs(part: Floats, touched: Floats) -> Registration:
     R = Rotation.align_vectors(touched - centre, part - origin)[0].as_matrix()
     position = centre - R @ origin
     residual = np.linalg.norm(part @ R.T + position - touched, axis=1)
-    return Registration(R, position, residual, conditioning, 3 * len(part) - 6)
+    spare = 3 * len(part) - 6
+    squares = float(np.sum(residual**2))
+    at = (part if extreme is None else extreme) @ R.T + position
+    # Three pairs of three distances each leave three degrees of freedom, so that it is never 0.
+    bound = pose_bound.ellipsoid(conditioning, len(touched), squares, spare, at)
+    return Registration(R, position, residual, conditioning, spare, bound)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What registration asks of a part, in its own frame.
+
+    Attributes
+    ----------
+    closest : callable
+        See `Closest`.
+    extreme : array, shape (m, 3)
+        The corners of its convex hull, mm: one of them moves most, whatever the motion.
+    places : array, shape (k, 3)
+        Points of its surface where a tip can touch, mm.
+    """
+
+    closest: Closest
+    extreme: Floats
+    places: Floats
+
+    @classmethod
+    def of(cls, surface: "Mesh") -> "Part":
+        """Return a mesh as registration asks of it."""
+
+        def closest(points: Floats) -> tuple[Floats, Floats]:
+            hits = surface.closest(points)
+            return hits.position, hits.normal
+
+        a, b, c = np.moveaxis(surface.corners, 1, 0)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        largest = np.argsort(-area, kind="stable")[:_PLACES]
+        return cls(closest, _extreme(surface.V), surface.corners[largest].mean(axis=1))
+
+
+def _extreme(V: Floats) -> Floats:
+    try:
+        return np.asarray(V[ConvexHull(V).vertices])
+    except QhullError:  # flat: it has no hull in space
+        return V
+
+
+def starts_near(touched: Floats, rotation: Floats, position: Floats) -> Poses:
+    """Return starts about a rough pose, itself the first."""
+    centre = touched.mean(axis=0)
+    return pose_search.near(rotation, position, centre, STARTS, START_SHIFT, START_TURN)
+
+
+def starts_anywhere(touched: Floats, part: Part) -> Poses:
+    """Return starts in all orientations, with the middle of the touched points in the part's."""
+    middles = [
+        part.places.mean(axis=0),
+        0.5 * (part.extreme.min(axis=0) + part.extreme.max(axis=0)),
+    ]
+    about = touched.mean(axis=0)
+    some = [pose_search.anywhere(middle, about, ORIENTATIONS) for middle in middles]
+    return pose_search.joined(*some)
 
 
 def onto_surface(
-    touched: Floats, closest: Closest, rotation: Floats, position: Floats
+    touched: Floats,
+    part: Part,
+    starts: Poses,
+    approach: Floats | None = None,
+    limit: float = LIMIT,
 ) -> Registration:
     """Find the pose that lays a part's surface onto points touched anywhere on it.
 
@@ -177,10 +242,13 @@ def onto_surface(
     ----------
     touched : array, shape (n, 3)
         Base frame, mm.
-    closest : callable
-        See `Closest`.
-    rotation, position : array, shape (3, 3) and (3,)
-        A pose near the true one: each point must find the side of the part that it was touched on.
+    part : Part
+    starts : Poses
+        Of `starts_near` or `starts_anywhere`.
+    approach : array, shape (n, 3), optional
+        Unit directions in which the tip came to the points, base frame; NaN where not known.
+    limit : float
+        Poses that differ by more than this somewhere on the part are different ones, mm.
 
     Returns
     -------
@@ -191,110 +259,131 @@ def onto_surface(
     InputError
         Fewer than seven points, or points that leave the part free to move.
     """
-    if len(touched) < MIN_TOUCHED:
+    count = len(touched)
+    if count < MIN_TOUCHED:
         raise InputError(
-            f"{len(touched)} touched points; without matching points of the part, "
+            f"{count} touched points; without matching points of the part, "
             f"{MIN_TOUCHED} at least are needed, spread over all its sides"
         )
-    centre = touched.mean(axis=0)
-    arms = touched - centre
-    radius = _radius(arms)
-
-    def offsets(x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distances of the points turned by x[3:]/radius about c and moved by x[:3].
-
-        With them their gradients and the turned arms, base axes.
-        """
-        turned = arms @ rotations.exp(x[3:] / radius).T
-        in_part = (turned + centre + x[:3] - position) @ rotation
-        foot, normal = closest(in_part)
-        away = in_part - foot
-        distance = np.linalg.norm(away, axis=1)
-        side = np.where(np.sum(away * normal, axis=1) < 0.0, -1.0, 1.0)
-        safe = np.where(distance > 1e-9, distance, 1.0)[:, None]
-        gradient = np.where(distance[:, None] > 1e-9, away / safe * side[:, None], normal)
-        return side * distance, gradient @ rotation.T, turned
-
-    def distances(x: Floats) -> Floats:
-        return offsets(x)[0]
-
-    def jacobian(x: Floats) -> Floats:
-        _, gradient, turned = offsets(x)
-        turn = np.cross(turned, gradient) @ _left_jacobian(x[3:] / radius) / radius
-        return np.concatenate([gradient, turn], axis=1)
-
-    x = np.zeros(6)
-    scale = 1.0
-    for loss in ("linear", "soft_l1", "soft_l1"):
-        x = least_squares(
-            distances,
-            x,
-            jac=jacobian,
-            loss=loss,
-            f_scale=scale,
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-            max_nfev=200,
-        ).x
-        # The median of absolute deviations, as a normal distribution's standard deviation.
-        scale = max(1.4826 * float(np.median(np.abs(distances(x)))), 1e-3)
-    # The touched points were moved onto the part: the part moves the other way.
-    R = rotations.exp(-x[3:] / radius)
-    rotation_found = R @ rotation
-    position_found = R @ (position - x[:3] - centre) + centre
-    foot, normal = closest((touched - position_found) @ rotation_found)
-    residual = np.linalg.norm(foot @ rotation_found.T + position_found - touched, axis=1)
-    conditioning = _conditioning(touched, normal @ rotation_found.T, len(touched))
-    _refuse_unseen(conditioning, "touch sides that face other ways too")
-    return Registration(rotation_found, position_found, residual, conditioning, len(touched) - 6)
-
-
-def _conditioning(points: Floats, normals: Floats, touched: int) -> Conditioning:
-    """Gains of rows of points and normals (k, 3) that came from this many touched points."""
-    centre = points.mean(axis=0)
-    arms = points - centre
-    radius = _radius(arms)
-    rows = np.concatenate([normals, np.cross(arms, normals) / radius], axis=1)
-    _, gains, motions = np.linalg.svd(rows / np.sqrt(touched), full_matrices=False)
-    return Conditioning(gains, motions, centre, radius)
-
-
-def _radius(arms: Floats) -> float:
-    radius = float(np.sqrt(np.mean(np.sum(arms**2, axis=1))))
-    if radius < 1e-9:
-        raise InputError("the touched points are all one point; spread them over the part")
-    return radius
-
-
-def _refuse_unseen(conditioning: Conditioning, advice: str) -> None:
-    free = conditioning.free()
-    if free:
-        raise InputError(f"the touched points leave the part free: it {'; '.join(free)}; {advice}")
-
-
-def _left_jacobian(rotvec: Floats) -> Floats:
-    """J of Exp(ω + δ) = Exp(J δ) Exp(ω) to first order (G. Chirikjian, 2012, ch. 10)."""
-    angle = float(np.linalg.norm(rotvec))
-    K = rotations.skew(rotvec)
-    if angle < 1e-4:
-        return np.asarray(np.eye(3) + K / 2.0 + K @ K / 6.0)
-    return np.asarray(
-        np.eye(3)
-        + (1.0 - np.cos(angle)) / angle**2 * K
-        + (angle - np.sin(angle)) / angle**3 * (K @ K)
+    radius_of(touched - touched.mean(axis=0))
+    _refuse_size(touched, part)
+    spare = count - 6
+    poses, squares = pose_search.descend(touched, part.closest, starts)
+    # What fits as well beside the best pose may lead to one that is better yet.
+    tried, fit = _beside(touched, part, poses[:1], limit)
+    more = np.flatnonzero(fit <= squares[0] + pose_bound.sure_rise(squares[0], spare))
+    if len(more):
+        found, fit = pose_search.descended(touched, part.closest, tried[more])
+        poses, squares = pose_search.joined(poses, found), np.concatenate([squares, fit])
+    cost, directed = _directed(touched, part, poses, squares, approach, limit)
+    first = int(np.argmin(cost))
+    best = steadied(touched, part.closest, poses[first : first + 1])
+    distance = pose_search.signed(best.to_part(touched), part.closest)[0][0]
+    conditioning = _conditioning_at(touched, part, best)
+    refuse_unseen(conditioning, "touch sides that face other ways too")
+    least = float(np.sum(distance**2))
+    tried, fit = _beside(touched, part, best, limit)
+    likely = pose_bound.likely_rise(least, spare)
+    apart = pose_bound.displacement(poses, best, part.extreme)
+    # Another minimum within the limit is the same pose, less certain.
+    same = (cost <= cost[first] + likely) & (apart <= limit)
+    beside = pose_bound.displacement(tried[fit <= least + likely], best, part.extreme)
+    at = best.to_base(part.extreme)[0]
+    bound = max(
+        pose_bound.ellipsoid(conditioning, count, least, spare, at),
+        float(beside.max(initial=0.0)),
+        float(apart[same].max(initial=0.0)),
+    )
+    others = np.flatnonzero(apart > limit)
+    rival = None
+    if len(others):
+        second = int(others[np.argmin(cost[others])])
+        near = bool(cost[second] <= cost[first] + pose_bound.sure_rise(least, spare))
+        rms = float(np.sqrt(squares[second] / count))
+        rival = _rival(part, best, poses[second : second + 1], rms, near)
+    rotation, position = best.rotation[0], best.position[0]
+    residual = np.abs(distance)
+    return Registration(
+        rotation,
+        position,
+        residual,
+        conditioning,
+        spare,
+        bound,
+        rival,
+        directed,
+        _one_sided(distance),
     )
 
 
-def _canonical(direction: Floats) -> Floats:
-    """Unit vector, its largest component positive: an axis has no sign."""
-    return np.asarray(direction / (np.linalg.norm(direction) * _sign(direction)))
+def _one_sided(distance: Floats) -> float:
+    """Median of signed distances (n,), mm, where it is beyond doubt; else 0."""
+    middle, spread = float(np.median(distance)), float(np.std(distance))
+    sure = max(_LEAST_SHIFT, 5.0 * spread / np.sqrt(len(distance)))
+    return middle if abs(middle) > sure else 0.0
 
 
-def _sign(direction: Floats) -> float:
-    return float(np.sign(direction[np.argmax(np.abs(direction))]))
+def _refuse_size(touched: Floats, part: Part) -> None:
+    across = float(np.linalg.norm(np.ptp(touched, axis=0)))
+    # No distance between two points of the part is larger than its box's diagonal.
+    most = float(np.linalg.norm(np.ptp(part.extreme, axis=0)))
+    spread = float(np.linalg.norm(touched - touched.mean(axis=0), axis=1).max())
+    if spread > 1.1 * most or across < most / _SMALL:
+        raise InputError(
+            f"the touched points are {across:.4g} mm across, the part {most:.4g} mm: check the "
+            "part's unit of length (--unit), and that x y z are in mm"
+        )
 
 
-def _shown(vector: Floats, digits: int) -> str:
-    rounded = np.round(vector, digits) + 0.0
-    return "(" + ", ".join(f"{value:.{digits}f}" for value in rounded) + ")"
+def _beside(touched: Floats, part: Part, best: Poses, limit: float) -> tuple[Poses, Floats]:
+    conditioning = _conditioning_at(touched, part, best)
+    return pose_bound.beside(touched, part.closest, best, conditioning, part.extreme, limit)
+
+
+def _conditioning_at(touched: Floats, part: Part, pose: Poses) -> Conditioning:
+    _, normal = part.closest(pose.to_part(touched)[0])
+    return conditioning_of(touched, normal @ pose.rotation[0].T, len(touched))
+
+
+def _directed(
+    touched: Floats,
+    part: Part,
+    poses: Poses,
+    squares: Floats,
+    approach: Floats | None,
+    limit: float,
+) -> tuple[Floats, bool]:
+    """Add to the sums of squares what touches that come out of the part speak against a pose.
+
+    Each counts as a point that is off by the limit. Directions that speak against every pose are
+    wrong themselves, and not used.
+    """
+    if approach is None:
+        return squares, False
+    _, normal = part.closest(poses.to_part(touched).reshape(-1, 3))
+    normal = normal.reshape(len(poses), -1, 3) @ np.swapaxes(poses.rotation, 1, 2)
+    facing = np.sum(normal * approach, axis=2)
+    astray = np.sum(facing > _FACING, axis=1)  # not where it is NaN
+    cost = squares + limit**2 * astray
+    known = int(np.sum(np.isfinite(approach[:, 0])))
+    if astray[int(np.argmin(cost))] > _MOST_ASTRAY * known:
+        return squares, False
+    return cost, True
+
+
+def _rival(part: Part, best: Poses, other: Poses, rms: float, near: bool) -> Rival:
+    places = best.to_base(part.places)[0]
+    off = np.abs(pose_search.signed(other.to_part(places), part.closest)[0][0])
+    worst = int(np.argmax(off))
+    apart = float(pose_bound.displacement(other, best, part.extreme)[0])
+    turned = float(np.linalg.norm(rotations.log_one(other.rotation[0] @ best.rotation[0].T)))
+    return Rival(
+        other.rotation[0],
+        other.position[0],
+        rms,
+        apart,
+        turned,
+        near,
+        places[worst],
+        float(off[worst]),
+    )

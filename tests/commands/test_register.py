@@ -1,6 +1,7 @@
 """register at the command line: where a part lies, how well that is known, and what is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,8 +9,14 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.records import pose, streams
+from dmpcli.commands import register_checks
+from dmpcli.errors import RefusedError
+from dmpcli.records import pose, streams, touched
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.pose_search import Poses
+from dmpcli.surfaces.registration import Part, onto_surface
 from tests.records.meshes import box, obj, written
+from tests.surfaces.registration_trial import touched_on, wedge
 
 V, F = box((100.0, 60.0, 40.0))
 SIX = [400.0, -120.0, 35.0, 0.2, -0.1, 1.3]
@@ -127,6 +134,11 @@ def test_a_residual_above_the_limit_is_refused_by_row_and_nothing_is_written(lab
         (["touched.csv", "--max-residual", "nan"], "--max-residual nan: must be"),
         (["touched.csv", "--initial", "1", "2"], "--initial 1 2: a pose is six numbers"),
         (["touched.csv", "--unit", "inch"], "unit inch: must be one of"),
+        (["touched.csv", "--max-error", "-1"], "--max-error -1: must be"),
+        (["touched.csv", "--guess", "far"], "--guess far: must be near or none"),
+        (["touched.csv", "--guess", "none", "--initial", *NEAR], "leave --initial out"),
+        (["corners.csv", "--guess", "none"], "leave --guess out"),
+        (["still.csv", "--initial", *NEAR], "line 2: a direction has a length"),
         (["corners.csv", "--initial", *NEAR], "leave --initial out"),
         (["none.csv"], "none.csv: no such file"),
         (["few.csv"], "few.csv: 3 touched points; without matching points"),
@@ -141,6 +153,7 @@ def test_a_users_mistake_is_one_line_and_exit_code_2(lab, args, words):
     (lab / "half.csv").write_text("x,y,z,px,py\n1,2,3,4,5\n")
     (lab / "text.csv").write_text("x,y,z,px,py,pz\n1,2,3,4,5,6\n1,2,3,4,two,6\n")
     (lab / "gap.csv").write_text("x,y,z\n1,,3\n")
+    (lab / "still.csv").write_text("x,y,z,ax,ay,az\n1,2,3,0,0,0\n")
     rng = np.random.default_rng(2)
     table(lab / "top.csv", rng.uniform(-0.4, 0.4, (20, 3)) * [100, 60, 0] + [0, 0, 20])
     done = run("part.stl", *args, "-o", "pose.json")
@@ -162,3 +175,140 @@ def test_the_pose_goes_to_standard_output_as_data_alone(lab):
     done = run("part.stl", "corners.csv", "-o", "-")
     assert done.exit_code == 0
     assert json.loads(done.stdout)["schema"] == "pose"
+
+
+@pytest.fixture
+def wedge_lab(lab):
+    """A part without symmetry, touched at 24 points."""
+    rng = np.random.default_rng(5)
+    corners, faces = wedge()
+    (lab / "wedge.stl").write_bytes(written(corners, faces, "stl"))
+    on_part = touched_on(corners, faces, 24, rng)
+    table(lab / "on.csv", on_part @ R.T + T + 0.05 * rng.standard_normal(on_part.shape))
+    return lab
+
+
+def assert_wedge(folder):
+    corners, _ = wedge()
+    placed, file = found(folder)
+    error = np.linalg.norm(placed.to_base(corners) - (corners @ R.T + T), axis=1).max()
+    assert error < 0.5
+    assert error <= file.conditioning.uncertainty
+
+
+def test_without_a_guess_all_orientations_are_searched(wedge_lab):
+    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--guess", "none")
+    assert done.exit_code == 0, done.stderr
+    assert_wedge(wedge_lab)
+    file = found(wedge_lab)[1]
+    assert file.options["guess"] == "none"
+    assert file.unit == "mm"
+    assert file.runner_up.rms > 3.0 * file.residuals.rms
+    assert file.runner_up.apart > 1.5
+    assert "the runner-up, turned by" in done.stderr
+    assert "at every point of the part (95 %)" in done.stderr
+
+
+def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedge_lab):
+    bad = [900, 300, -200, 2.2, 1.0, -1]
+    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *bad, "-q")
+    assert done.exit_code == 0
+    assert re.search(r"on\.csv: the start is bad, [0-9.]+ mm and [0-9.]+° from", done.stderr)
+    assert_wedge(wedge_lab)
+
+
+def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(wedge_lab):
+    points = touched.read(streams.read(wedge_lab / "on.csv"))
+    part = Part.of(Mesh(*wedge()))
+    start = pose.Pose.of(np.array([446.0, -61.0, 18.0, 2.6, 1.3, -2.5]))
+    alone = Poses(start.rotation[None], start.position[None])
+    stuck = onto_surface(points.base, part, alone)
+    with pytest.raises(RefusedError, match=r"on\.csv: the start is bad: --initial is ") as error:
+        register_checks.refuse_unsure(stuck, points, part, start, 1.0, 1.5, True)
+    pasted = str(error.value).split("give --initial ")[1].split(",")[0].split()
+    done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *pasted)
+    assert done.exit_code == 0, done.stderr
+    assert "start is bad" not in done.stderr
+    assert_wedge(wedge_lab)
+
+
+def test_a_part_that_looks_the_same_turned_over_is_refused_from_a_bad_start(lab):
+    over = Rotation.from_matrix(R @ np.diag([-1.0, 0.6, -0.6]) @ R.T @ R).as_euler("XYZ")
+    done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", 480, -60, 0, *over)
+    assert done.exit_code == 3
+    assert "the part looks the same in both" in done.stderr
+
+
+def test_a_residual_that_stands_out_is_told_by_row(lab):
+    rows = np.loadtxt(lab / "touched.csv", delimiter=",", skiprows=1)
+    top = int(np.argmax((rows - T) @ R[:, 2]))
+    rows[top] += 0.7 * R[:, 2]
+    table(lab / "odd.csv", rows)
+    done = run("part.stl", "odd.csv", "-o", "pose.json", "--initial", *NEAR, "-q")
+    assert done.exit_code == 0
+    assert f"odd.csv: line {top + 2}: lies 0." in done.stderr
+    assert "touch it again" in done.stderr
+
+
+def test_touches_in_metres_are_refused_for_their_unit(wedge_lab):
+    rows = np.loadtxt(wedge_lab / "on.csv", delimiter=",", skiprows=1) / 1000.0
+    table(wedge_lab / "m.csv", rows)
+    done = run("wedge.stl", "m.csv", "-o", "pose.json")
+    assert done.exit_code == 2
+    assert "check the part's unit of length (--unit), and that x y z are in mm" in done.stderr
+
+
+def test_a_part_that_looks_the_same_turned_over_needs_a_start(lab):
+    done = run("part.stl", "touched.csv", "-o", "pose.json", "--guess", "none")
+    assert done.exit_code == 3
+    assert "another pose fits the 60 points nearly as well" in done.stderr
+    assert "turned by 180.0°" in done.stderr
+    assert "the part looks the same in both" in done.stderr
+    assert "give a rough pose with --initial" in done.stderr
+
+
+def test_few_points_are_refused_for_their_rival_with_the_place_to_touch(lab):
+    rng = np.random.default_rng(0)
+    corners, faces = wedge()
+    (lab / "wedge.stl").write_bytes(written(corners, faces, "stl"))
+    few = touched_on(corners, faces, 9, rng) @ R.T + T + 0.1 * rng.standard_normal((9, 3))
+    table(lab / "few9.csv", few)
+    done = run("wedge.stl", "few9.csv", "-o", "pose.json", "--initial", *NEAR)
+    assert done.exit_code == 3
+    assert "another pose fits the 9 points nearly as well" in done.stderr
+    assert "touch more points, one of them near" in done.stderr
+
+
+def test_an_error_above_the_limit_is_refused_and_of_pairs_told(wedge_lab):
+    words = ["wedge.stl", "on.csv", "-o", "pose.json", "--initial", *NEAR]
+    done = run(*words, "--max-error", 0.01)
+    assert done.exit_code == 3
+    assert "more than --max-error 0.01" in done.stderr
+    points = V @ R.T + T + 0.1 * np.random.default_rng(4).standard_normal(V.shape)
+    table(wedge_lab / "hand.csv", points, V)
+    done = run("part.stl", "hand.csv", "-o", "pose.json", "--max-error", 0.01, "-q")
+    assert done.exit_code == 0
+    assert "more than --max-error 0.01" in done.stderr
+
+
+@pytest.mark.parametrize("columns", [("ax", "ay", "az"), ("rx", "ry", "rz")])
+def test_directions_that_come_out_of_the_part_are_not_used_and_that_is_told(wedge_lab, columns):
+    corners, faces = wedge()
+    rng = np.random.default_rng(5)
+    faces_hit = rng.integers(0, len(faces), 40)
+    a, b, c = np.moveaxis(corners[faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal = (normal / np.linalg.norm(normal, axis=1)[:, None])[faces_hit] @ R.T
+    inner = rng.dirichlet([3.0, 3.0, 3.0], 40)
+    points = np.einsum("ki,kij->kj", inner, corners[faces[faces_hit]]) @ R.T + T
+    for sign, warned in ((-1.0, False), (1.0, True)):
+        said = sign * normal
+        if columns[0] == "rx":
+            turns = [Rotation.align_vectors([n], [[0.0, 0.0, 1.0]])[0] for n in said]
+            said = np.array([turn.as_euler("XYZ") for turn in turns])
+        rows = [",".join(map(repr, map(float, row))) for row in np.hstack([points, said])]
+        (wedge_lab / "dir.csv").write_text("\n".join([",".join(("x", "y", "z", *columns)), *rows]))
+        done = run("wedge.stl", "dir.csv", "-o", "pose.json", "--initial", *NEAR)
+        assert done.exit_code == 0, done.stderr
+        assert ("point out of the part" in done.stderr) is warned
+        assert_wedge(wedge_lab)

@@ -9,45 +9,23 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.registration import from_pairs, onto_surface
+from dmpcli.surfaces.registration import (
+    Part,
+    from_pairs,
+    onto_surface,
+    starts_anywhere,
+    starts_near,
+)
 from tests.records.meshes import box, grid
+from tests.surfaces.registration_trial import loaded, motion, near, touched_on, trial
 
 BUMPY = grid(41, 90.0, lambda x, y: 6.0 * np.sin(x * 2 * np.pi / 90) * np.cos(y * 2 * np.pi / 80))
 SEEDS = st.integers(0, 10_000)
 
 
-def touched_on(V, F, count, rng, faces=None):
-    """Points spread over a mesh, or over some of its faces, by area."""
-    F = F if faces is None else F[faces]
-    a, b, c = np.moveaxis(V[F], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    chosen = rng.choice(len(F), count, p=area / area.sum())
-    return np.einsum("ki,kij->kj", rng.dirichlet([1.0, 1.0, 1.0], count), V[F[chosen]])
-
-
-def motion(rng, angle=None, shift=500.0):
-    """A random rigid motion: R, t."""
-    turn = Rotation.random(rng=rng).as_rotvec()
-    if angle is not None:
-        turn *= angle / np.linalg.norm(turn)
-    return Rotation.from_rotvec(turn).as_matrix(), rng.uniform(-shift, shift, 3)
-
-
-def closest_on(V, F):
-    surface = Mesh(V, F)
-
-    def closest(points):
-        hits = surface.closest(points)
-        return hits.position, hits.normal
-
-    return closest
-
-
-def near(R, t, centre, rng, angle, shift):
-    """A pose that is off by a turn about the part's centre and a shift."""
-    turn, _ = motion(rng, angle)
-    step = rng.standard_normal(3)
-    return turn @ R, R @ centre + t - turn @ R @ centre + shift * step / np.linalg.norm(step)
+def laid(points, V, F, R, t):
+    """The pose found near another."""
+    return onto_surface(points, Part.of(Mesh(V, F)), starts_near(points, R, t))
 
 
 @settings(max_examples=50, deadline=None)
@@ -81,7 +59,7 @@ def test_the_residuals_of_noisy_pairs_are_those_of_scipy():
     found = from_pairs(part, noisy)
     _, distance = Rotation.align_vectors(noisy - noisy.mean(axis=0), part - part.mean(axis=0))
     assert found.rms == pytest.approx(distance / 3.0)
-    assert 0.02 < found.uncertainty < 0.2
+    assert 0.05 < found.uncertainty < 0.4
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.5])
@@ -101,16 +79,14 @@ def test_too_few_pairs_one_point_and_a_wrong_unit_are_refused():
         from_pairs(part / 1000.0, part)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(SEEDS, st.sampled_from(["box", "bumpy"]))
 def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
     rng = np.random.default_rng(seed)
     V, F = box((100.0, 60.0, 40.0)) if kind == "box" else BUMPY
     points = touched_on(V, F, 40, rng)
     R, t = motion(rng)
-    found = onto_surface(
-        points @ R.T + t, closest_on(V, F), *near(R, t, V.mean(axis=0), rng, 0.08, 4.0)
-    )
+    found = laid(points @ R.T + t, V, F, *near(R, t, V.mean(axis=0), rng, 0.08, 4.0))
     back = V @ found.rotation.T + found.position
     np.testing.assert_allclose(back, V @ R.T + t, atol=1e-6)
     assert found.residual.max() < 1e-6
@@ -119,19 +95,18 @@ def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
 def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
-    closest = closest_on(V, F)
     errors, told = [], []
-    for _ in range(30):
+    for _ in range(6):
         points = touched_on(V, F, 60, rng)
         R, t = motion(rng)
         noisy = points @ R.T + t + 0.05 * rng.standard_normal(points.shape)
-        found = onto_surface(noisy, closest, *near(R, t, V.mean(axis=0), rng, 0.05, 3.0))
+        found = laid(noisy, V, F, *near(R, t, V.mean(axis=0), rng, 0.05, 3.0))
         moved = points @ found.rotation.T + found.position - (points @ R.T + t)
         errors.append(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         told.append(found.uncertainty)
         assert found.rms == pytest.approx(0.05, rel=0.35)
-    assert np.median(errors) < 3.0 * np.median(told)
-    assert np.median(errors) < 0.1
+    assert np.sum(np.array(errors) > told) <= 1
+    assert np.median(told) < 0.4
 
 
 def test_a_mistouched_point_is_told_and_hardly_moves_the_part():
@@ -142,7 +117,7 @@ def test_a_mistouched_point_is_told_and_hardly_moves_the_part():
     noisy = points @ R.T + t + 0.02 * rng.standard_normal(points.shape)
     top = int(np.argmax(points[:, 2]))
     noisy[top] += 8.0 * R[:, 2]
-    found = onto_surface(noisy, closest_on(V, F), *near(R, t, np.zeros(3), rng, 0.05, 3.0))
+    found = laid(noisy, V, F, *near(R, t, np.zeros(3), rng, 0.05, 3.0))
     assert int(np.argmax(found.residual)) == top
     assert found.residual[top] == pytest.approx(8.0, abs=0.2)
     assert np.median(found.residual) < 0.03
@@ -179,7 +154,7 @@ def test_a_part_that_can_slide_under_the_points_is_refused_with_its_motions(mesh
     V, F = mesh()
     points = touched_on(V, F, 60, rng)
     with pytest.raises(InputError) as error:
-        onto_surface(points, closest_on(V, F), np.eye(3), np.array([0.01, 0.0, 0.01]))
+        laid(points, V, F, np.eye(3), np.array([0.01, 0.0, 0.01]))
     named = str(error.value).split("free: it ")[1].split("; ")
     assert len(named) == len(free) + 1
     for said, expected in zip(named[:-1], free, strict=True):
@@ -192,7 +167,7 @@ def test_a_box_touched_on_one_face_only_is_refused():
     top = np.flatnonzero((V[F][:, :, 2] > 19.0).all(axis=1))
     points = touched_on(V, F, 30, rng, top) * [0.8, 0.8, 1.0]
     with pytest.raises(InputError, match=r"slides along .*slides along .*turns about"):
-        onto_surface(points, closest_on(V, F), np.eye(3), np.zeros(3))
+        laid(points, V, F, np.eye(3), np.zeros(3))
 
 
 def test_motions_are_named_in_the_base_frame():
@@ -201,7 +176,7 @@ def test_motions_are_named_in_the_base_frame():
     R = Rotation.from_euler("y", 90, degrees=True).as_matrix()
     points = touched_on(V, F, 60, rng) @ R.T + [0.0, 30.0, 200.0]
     with pytest.raises(InputError) as error:
-        onto_surface(points, closest_on(V, F), R, np.array([0.0, 30.0, 200.0]))
+        laid(points, V, F, R, np.array([0.0, 30.0, 200.0]))
     slide, turn, _ = str(error.value).split("; ")
     assert slide.endswith("slides along (1.00, 0.00, 0.00)")
     assert turn.startswith("turns about (1.00, 0.00, 0.00) through (")
@@ -212,4 +187,85 @@ def test_motions_are_named_in_the_base_frame():
 def test_six_touched_points_are_too_few():
     V, F = BUMPY
     with pytest.raises(InputError, match="6 touched points"):
-        onto_surface(V[:6], closest_on(V, F), np.eye(3), np.zeros(3))
+        laid(V[:6], V, F, np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "least"),
+    [("wedge", 8, 0.0), ("bracket", 12, 0.2), ("wedge", 20, 0.75), ("bracket", 30, 0.85)],
+)
+def test_accepted_poses_are_right_and_within_their_bound(name, count, least):
+    """`benchmarks/registration.py` in small."""
+    V, F, part = loaded(name)
+    found = [trial(V, F, part, count, seed) for seed in range(8)]
+    good = [one for one in found if one.verdict == "accepted"]
+    assert all(one.error < 1.5 for one in good)
+    assert sum(one.error > one.bound for one in good) <= 1
+    assert len(good) >= least * len(found)
+
+
+def test_in_all_orientations_the_pose_is_found_without_a_start():
+    V, F, part = loaded("bracket")
+    found = [trial(V, F, part, 24, seed, anywhere=True) for seed in range(2)]
+    assert [one.verdict for one in found] == ["accepted"] * 2
+    assert max(one.error for one in found) < 1.0
+
+
+def test_a_box_in_all_orientations_has_a_rival_that_looks_the_same():
+    rng = np.random.default_rng(11)
+    V, F = box((100.0, 60.0, 40.0))
+    part = Part.of(Mesh(V, F))
+    points = touched_on(V, F, 40, rng) + 0.05 * rng.standard_normal((40, 3))
+    found = onto_surface(points, part, starts_anywhere(points, part))
+    assert found.rival.near
+    assert np.degrees(found.rival.turned) == pytest.approx(180.0, abs=0.5)
+    assert found.rival.difference < 0.3
+    near_it = laid(points, V, F, np.eye(3), np.ones(3))
+    assert near_it.rival is None or not near_it.rival.near
+
+
+def test_directions_of_approach_tell_sides_of_a_thin_plate_apart():
+    """A plate of 3 mm touched on top and along its upper edge: it may also lie 3 mm higher."""
+    rng = np.random.default_rng(12)
+    V, F = wedge_plate()
+    top = np.flatnonzero(np.isclose(V[F][:, :, 2].min(axis=1), 3.0))
+    sides = np.flatnonzero(np.ptp(V[F][:, :, 2], axis=1) > 1.0)
+    points = np.concatenate([touched_on(V, F, 9, rng, top), touched_on(V, F, 10, rng, sides)])
+    points[9:, 2] = 2.98
+    normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (9, 1)), np.full((10, 3), np.nan)])
+    part = Part.of(Mesh(V, F))
+    low = np.array([0.0, 0.0, 3.0])
+    noisy = points + 0.03 * rng.standard_normal(points.shape)
+    blind = onto_surface(noisy, part, starts_near(noisy, np.eye(3), low))
+    assert blind.rival.near
+    assert blind.rival.apart == pytest.approx(3.0, abs=0.3)
+    told = onto_surface(noisy, part, starts_near(noisy, np.eye(3), low), -normals)
+    assert told.directed
+    assert told.rival is None or not told.rival.near
+    np.testing.assert_allclose(told.position, 0.0, atol=0.3)
+
+
+def wedge_plate():
+    made = trimesh.Trimesh(
+        [(x, y, z) for z in (0.0, 3.0) for x, y in ((0, 0), (90, 10), (70, 60), (-5, 40))]
+    ).convex_hull
+    return np.array(made.vertices, dtype=float), np.array(made.faces)
+
+
+def test_the_radius_of_a_round_tip_is_seen():
+    rng = np.random.default_rng(13)
+    V, F, part = loaded("wedge")
+    points = touched_on(V, F, 40, rng)
+    outwards = part.closest(points)[1]
+    found = onto_surface(points + 0.5 * outwards, part, starts_near(points, np.eye(3), np.ones(3)))
+    assert found.outside == pytest.approx(0.5, abs=0.1)
+    bare = onto_surface(points, part, starts_near(points, np.eye(3), np.ones(3)))
+    assert bare.outside == 0.0
+
+
+@pytest.mark.parametrize("scale", [0.001, 10.0, 1000.0])
+def test_points_of_another_size_than_the_part_are_refused_for_their_unit(scale):
+    V, F, part = loaded("wedge")
+    points = scale * touched_on(V, F, 20, np.random.default_rng(14))
+    with pytest.raises(InputError, match="check the part's unit of length"):
+        onto_surface(points, part, starts_near(points, np.eye(3), np.zeros(3)))
