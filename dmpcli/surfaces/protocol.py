@@ -30,6 +30,8 @@ class Status(IntEnum):
     TORN = 9
     MISSED = 10
     TILTED = 11
+    NEAR_BORDER = 20
+    KEPT_OUT = 21
 
     @property
     def reason(self) -> str:
@@ -49,8 +51,14 @@ _REASONS = {
     Status.NOISY: "the stroke crosses a crease of a noisy scan; smooth the scan first",
     Status.TORN: "the stroke is torn at a corner or a step of the mesh; keep it off there",
     Status.MISSED: "the stroke misses its start or goal by over 0.01 mm; move them a little",
+    Status.NEAR_BORDER: "the stroke comes nearer to the border than --border-margin allows",
+    Status.KEPT_OUT: "the stroke enters a region of --keep-out",
     Status.TILTED: "normals lean off their facets by over 25°; the mesh is too coarse there",
 }
+
+
+LEAVES = (Status.BORDER, Status.NEAR_BORDER, Status.KEPT_OUT)
+"""Of strokes that are drawable where they are not outside."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +137,8 @@ class Lift:
         where not `outside`.
     unfolded : array of bool, shape (B,)
         Pairs that cross a sharp crease and were walked from face to face.
+    unsound : array of bool, shape (B, T), optional
+        Of strokes that left the surface and came back: points that are not where they should be.
     """
 
     position: Floats
@@ -136,6 +146,7 @@ class Lift:
     outside: Booleans
     status: Integers
     unfolded: Booleans
+    unsound: Booleans | None = None
 
     @property
     def normal(self) -> Floats:
