@@ -53,6 +53,8 @@ class Summary:
         Strokes that cross a sharp crease.
     kept : int
         Parts that an earlier run had drawn.
+    split : int
+        Pairs whose stroke was split.
     parts : int
     """
 
@@ -60,6 +62,7 @@ class Summary:
     failed: int = 0
     unfolded: int = 0
     kept: int = 0
+    split: int = 0
     parts: int = 0
 
 
@@ -161,6 +164,7 @@ class Batch:
         summary.drawn += size - len(outcome.failed)
         summary.failed += len(outcome.failed)
         summary.unfolded += outcome.unfolded
+        summary.split += len(outcome.pieces)
 
     def _table(self) -> Record:
         """Return the table of pairs with what became of each; one row for each piece of a split."""

@@ -50,6 +50,8 @@ ToolAcceleration = Annotated[
     typer.Option(metavar="MM_S2", help="At the ends and in corners at most (1000)."),
 ]
 
+SPLIT = "split at the border; pieces shorter than 5 mm are left out"
+
 _OFF = 1.0
 """How far the points of a line may lie off the surface, mm, unless --snap-tol says more."""
 
@@ -281,11 +283,18 @@ def _regions(
 
 
 def tell_of_pieces(
-    said: str, strokes: "Sequence[Stroke]", ids: "Sequence[str]", rate: float, quiet: bool
+    said: str,
+    strokes: "Sequence[Stroke]",
+    ids: "Sequence[str]",
+    rate: float,
+    split: bool,
+    quiet: bool,
 ) -> None:
     """Say what several strokes of one file are: copies, pieces, or both."""
     from dmpcli.commands.messages import tell
 
+    if split:
+        tell(SPLIT, quiet)
     poses = sum(len(stroke.position) for stroke in strokes)
     shown = ids[0] if len(ids) == 1 else f"{ids[0]} to {ids[-1]}"
     tell(

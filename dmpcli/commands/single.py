@@ -71,8 +71,9 @@ def write(
     if any(stroke.unfolded for stroke in strokes):
         warn("the stroke crosses a sharp crease, where no tool can follow the surface")
     said = f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
-    if len(strokes) > 1 or drawn[0].cuts:
-        tell_of_pieces(said, strokes, ids, task.style.rate, quiet)
+    split = any(stroke.cuts for stroke in drawn)
+    if len(strokes) > 1 or split:
+        tell_of_pieces(said, strokes, ids, task.style.rate, split, quiet)
         return
     [stroke] = strokes
     if len(stroke.position) < len(drawn[0].position):

@@ -118,8 +118,10 @@ class FlatRegion:
         rows = np.flatnonzero(meets.all(axis=1))
         for first in range(0, len(rows), size := self._rows_at_once(at)):
             some = rows[first : first + size]
-            held[some] = self._inside(at[some])
-            held[some, 1:] |= self._crossed(at[some])
+            inside = self._inside(at[some])
+            held[some] = inside
+            # The step that leads out of it ends outside.
+            held[some, 1:] |= self._crossed(at[some]) & ~inside[:, :-1]
         return held
 
     def _rows_at_once(self, at: Floats) -> int:
@@ -131,7 +133,8 @@ class FlatRegion:
         x, y = at[..., :1], at[..., 1:]
         spans = (a[:, 1] <= y) != (b[:, 1] <= y)
         rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-        meets = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
+        with np.errstate(over="ignore", invalid="ignore"):  # of edges that y does not span
+            meets = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
         return np.asarray((spans & (x < meets)).sum(axis=-1) % 2 == 1)
 
     def _crossed(self, at: Floats) -> Booleans:

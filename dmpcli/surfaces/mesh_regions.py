@@ -1,7 +1,7 @@
 """Regions within closed lines on meshes.
 
 A line is traced from facet to facet, each of its parts in the plane through its two points and the
-mean of their normals. Each edge of the mesh is crossed an even or an odd number of times: from
+mean normal about there. Each edge of the mesh is crossed an even or an odd number of times: from
 vertex to vertex that tells the sides of the line apart, whatever the shape of the part. Within a
 facet the line's own segments do.
 """
@@ -16,7 +16,7 @@ from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.vectors import cross, dot, length, unit
 
 _MOST_FACETS = 20_000
-# Points of a line are moved off edges and vertices by this part of the way to the facet's middle.
+# Points are moved off edges and vertices by this part of the way to the facet's middle.
 _OFF_EDGE = 1e-6
 # Between samples the mesh is looked at so often, mm.
 _STEP = 0.25
@@ -55,7 +55,9 @@ def traced(mesh: Mesh, line: Floats) -> Traced:
     point = point + _OFF_EDGE * (mesh.corners[face].mean(axis=1) - point)
     goal, last = np.roll(point, -1, axis=0), np.roll(face, -1)
     n = mesh.face_normals
-    normal = unit(n[face] + n[last])
+    # Between two points on the edges of a facet the facet's own normal counts most.
+    middle = mesh.search(0.5 * (point + goal))[1]
+    normal = unit(n[middle] + 0.5 * (n[face] + n[last]))
     side = cross(goal - point, normal)
     faces: list[Integers] = []
     begins: list[Floats] = []
@@ -166,11 +168,15 @@ class MeshRegion:
         fine = points[sample] + share[:, None] * (points[sample + 1] - points[sample])
         inside = self.inside(np.concatenate([points[:1], fine]))
         between = np.logical_or.reduceat(inside[1:], ends[:-1])
-        return np.asarray(np.concatenate([inside[:1], between]))
+        held: Booleans = inside[ends]
+        # The step that leads out of it ends outside.
+        held[1:] |= between & ~held[:-1]
+        return held
 
     def inside(self, points: Floats) -> Booleans:
         """Tell which points (N, 3) near the mesh are inside."""
         foot, face = self.mesh.search(points)
+        foot = foot + _OFF_EDGE * (self.mesh.corners[face].mean(axis=1) - foot)
         corner = self.mesh.F[face, 0]
         inside: Booleans = self.within[corner].copy()
         first = np.searchsorted(self.face, face, side="left")
