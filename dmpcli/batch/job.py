@@ -196,7 +196,10 @@ def _settled(task: Task, name: str, stroke: Stroke) -> Settled:
         names = [f"{name}.{i}" for i in range(1, len(stroke.cuts) + 1)]
         return Settled(names, stroke.pieces(), OK)
     if stroke.status in LEAVES and task.style.on_border == "clip":
-        return Settled([name], [stroke.until_border()], OK)
+        clipped = stroke.until_border()
+        # One pose is no stroke; of one that begins outside not even that is there.
+        if len(clipped.position) > 1:
+            return Settled([name], [clipped], OK)
     return Settled([name], [stroke], stroke.status.reason)
 
 

@@ -39,16 +39,23 @@ def write(
     from dmpcli.primitives.drawing import draw, seen_from
     from dmpcli.records import record, streams, trajectory
     from dmpcli.records.pairs import OK
+    from dmpcli.surfaces.protocol import LEAVES
 
     given = task.surface
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     with about("skill"):
         drawn = draw(task.skill, pairs, duration, given, task.style)
     settled = settle(task, table.ids, drawn)
-    for name, one in zip(table.ids, settled, strict=True):
-        if one.status != OK:
-            which = f"copy {name}: " if len(table) > 1 else ""
+    skipped = set()
+    if task.style.on_border == "skip" and any(one.status == OK for one in settled):
+        skipped = {i for i, one in enumerate(drawn) if one.status in LEAVES}
+    for i, one in enumerate(settled):
+        which = f"copy {table.ids[i]}: " if len(table) > 1 else ""
+        if i in skipped:
+            warn(f"{which}skipped: {one.status}")
+        elif one.status != OK:
             raise RefusedError(f"{which}{one.status}; {_remedy(one.status, given is not None)}")
+    settled = [one for i, one in enumerate(settled) if i not in skipped]
     strokes = [stroke for one in settled for stroke in one.strokes]
     seen, heights = seen_from(task.skill, task.style, pairs, given)
     facts = provenance.facts | trajectory.facts_of(seen, task.style, heights)

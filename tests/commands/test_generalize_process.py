@@ -224,6 +224,22 @@ def test_lead_and_tilt_are_those_against_the_normals_of_the_file(shop, tmp_path,
         np.testing.assert_allclose(found.stack(["nx", "ny", "nz"]), normal, atol=1e-6)
 
 
+def test_copies_over_the_edge_are_refused_skipped_split_or_clipped(shop, tmp_path):
+    # The third copy swings over the edge of the plate, the fourth begins beyond it.
+    options = [*FREE, "--surface", shop / "plate.ply", "--copies", 4, "--spacing", -10]
+    wanted = {
+        "fail": None,
+        "clip": None,
+        "skip": ["1_0", "1_1"],
+        "split": ["1_0", "1_1", "1_2.1", "1_2.2", "1_3.1"],
+    }
+    for on_border, ids in wanted.items():
+        out = tmp_path / on_border
+        done = run(shop / "s.json", "-o", out, *options, "--on-border", on_border)
+        assert done.exit_code == (3 if ids is None else 0), done.stderr
+        assert ids is None or list(strokes(out)[0]) == ids
+
+
 def test_a_batch_does_all_of_it_at_once_with_the_same_bytes_for_any_number_of_jobs(shop, tmp_path):
     options = [
         "--pairs", shop / "pairs.csv", "--surface", shop / "plate.ply", "--on-border", "split",
