@@ -213,9 +213,8 @@ def process_style(
     from dataclasses import replace
 
     from dmpcli.surfaces.keep_off import KeepOff
-    from dmpcli.surfaces.mesh import Mesh
 
-    if on_border == "split" and keep_out is None and not isinstance(surface, Mesh):
+    if on_border == "split" and keep_out is None and not _is_mesh(surface):
         raise InputError(
             "--on-border split: there is nothing to split at, for only a mesh has a border; leave "
             "it out, or name regions with --keep-out"
@@ -231,12 +230,18 @@ def process_style(
     )
 
 
+def _is_mesh(surface: "Surface | None") -> bool:
+    from dmpcli.surfaces.mesh import Mesh  # loads scipy
+
+    return isinstance(surface, Mesh)
+
+
 def _margin(margin: float | None, surface: "Surface | None") -> "BorderMargin | None":
+    if margin is None:
+        return None
     from dmpcli.surfaces.border_margin import BorderMargin
     from dmpcli.surfaces.mesh import Mesh
 
-    if margin is None:
-        return None
     if not isinstance(surface, Mesh):
         raise InputError(
             "--border-margin: planes, cylinders and spheres are endless and have no border; leave "

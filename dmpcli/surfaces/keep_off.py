@@ -1,13 +1,15 @@
 """Where on a surface no stroke may be: near its border, or within a closed line on it."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.border_margin import BorderMargin
 from dmpcli.surfaces.protocol import LEAVES, Status, first_refusal
+
+if TYPE_CHECKING:
+    from dmpcli.surfaces.border_margin import BorderMargin
 
 
 class Region(Protocol):
@@ -31,7 +33,7 @@ class KeepOff:
     regions : tuple of Region
     """
 
-    margin: BorderMargin | None = None
+    margin: "BorderMargin | None" = None
     regions: tuple[Region, ...] = ()
 
     def marked(
