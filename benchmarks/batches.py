@@ -293,7 +293,7 @@ _HELD: list[tuple[Task, Floats]] = []
 def in_memory(place: Path, V: Floats, F: Any, rows: Floats) -> float:
     """Trajectories per second of two processes that draw parts and write nothing."""
     skill, _ = skill_file.decode(streams.read(place / "skill.json"))
-    task = Task(skill, Mesh(V, F), Style(), "fail")
+    task = Task(skill, Mesh(V, F), Style())
     _HELD.append((task, rows))
     firsts = list(range(0, 16_000, 2000))
     with multiprocessing.get_context("fork").Pool(2, memory.keep) as pool:

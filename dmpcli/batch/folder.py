@@ -93,6 +93,7 @@ class Folder:
             fact["unfolded"],
             footer.num_rows,
             file.stat().st_size,
+            pieces={int(row): ends for row, ends in fact.get("pieces", {}).items()},
         )
 
     def leave(self) -> None:

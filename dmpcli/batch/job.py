@@ -7,7 +7,7 @@ however often a part is drawn, its file has the same bytes.
 import contextlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -21,7 +21,7 @@ from dmpcli.primitives.skill import Skill
 from dmpcli.records import record, trajectory
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Form, Provenance, Record
-from dmpcli.surfaces.protocol import Status, Surface
+from dmpcli.surfaces.protocol import LEAVES, Status, Surface
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,6 @@ class Task:
     skill : Skill
     surface : Surface or None
     style : Style
-    on_border : {'fail', 'clip', 'skip'}
-        What becomes of a stroke that leaves the surface.
     reach : Reach, optional
         The arm that is to draw, which must be able to follow.
     """
@@ -42,7 +40,6 @@ class Task:
     skill: Skill
     surface: Surface | None
     style: Style
-    on_border: str
     reach: Reach | None = None
 
 
@@ -105,6 +102,10 @@ def file_of(number: int) -> str:
     return f"part-{number:05d}.parquet"
 
 
+PieceEnds = tuple[list[float], list[float], float]
+"""Of a piece of a stroke: start and goal, mm, and how long it lasts, s."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What became of a part.
@@ -115,7 +116,10 @@ class Outcome:
     failed : dict of str
         Why a pair could not be drawn, by its row in the table.
     clipped : dict of float
-        How long a stroke lasts that ends at the border, s, by its row.
+        How long a stroke lasts whose pair does not tell it, s, by its row: one that ends at the
+        border, or whose speed is held.
+    pieces : dict of list
+        Of a stroke that is split: of each piece start, goal and seconds, by the row.
     unfolded : int
         How many strokes cross a sharp crease.
     rows, size : int
@@ -131,38 +135,72 @@ class Outcome:
     rows: int = 0
     size: int = 0
     fatal: bool = False
+    pieces: dict[int, list[PieceEnds]] = field(default_factory=dict)
 
     def fact(self) -> dict[str, Any]:
         """Return what the part's own metadata remember of it."""
-        return {
+        found: dict[str, Any] = {
             "number": self.number,
             "failed": {str(row): why for row, why in self.failed.items()},
             "clipped": {str(row): seconds for row, seconds in self.clipped.items()},
             "unfolded": self.unfolded,
         }
+        if self.pieces:
+            found["pieces"] = {str(row): ends for row, ends in self.pieces.items()}
+        return found
 
 
 FACT = "part"
 """Name of a part's own fact in its metadata; all else in them is the batch's."""
 
 
-def settle(task: Task, strokes: Sequence[Stroke]) -> list[tuple[Stroke, str]]:
-    """Return strokes as they are to be written, each with ``ok`` or why it cannot be drawn."""
-    found = [_settled(task, stroke) for stroke in strokes]
-    good = [i for i, (_, status) in enumerate(found) if status == OK]
-    if task.reach is not None and good:
-        refusals = task.reach.refusals([found[i][0] for i in good], task.style.rate)
-        for i, refusal in zip(good, refusals, strict=True):
-            found[i] = found[i][0], refusal or OK
+@dataclass(frozen=True)
+class Settled:
+    """What is written of a stroke.
+
+    Attributes
+    ----------
+    ids : list of str
+        One, or one for each piece of a stroke that is split.
+    strokes : list of Stroke
+        As they are to be written, one for each id.
+    status : str
+        ``ok``, or why it cannot be drawn.
+    """
+
+    ids: list[str]
+    strokes: list[Stroke]
+    status: str
+
+
+def settle(task: Task, ids: Sequence[str], strokes: Sequence[Stroke]) -> list[Settled]:
+    """Return strokes of these ids as they are to be written, or why they cannot be drawn."""
+    found = [_settled(task, name, stroke) for name, stroke in zip(ids, strokes, strict=True)]
+    if task.reach is None:
+        return found
+    good = [i for i, one in enumerate(found) if one.status == OK]
+    of = [i for i in good for _ in found[i].strokes]
+    if good:
+        parts = [stroke for i in good for stroke in found[i].strokes]
+        refusals = task.reach.refusals(parts, task.style.rate)
+        for i, refusal in zip(of, refusals, strict=True):
+            if refusal and found[i].status == OK:
+                found[i] = replace(found[i], status=refusal)
     return found
 
 
-def _settled(task: Task, stroke: Stroke) -> tuple[Stroke, str]:
+def _settled(task: Task, name: str, stroke: Stroke) -> Settled:
     if stroke.status == Status.DRAWN:
-        return stroke, OK
-    if stroke.status == Status.BORDER and task.on_border == "clip":
-        return stroke.until_border(), OK
-    return stroke, stroke.status.said
+        return Settled([name], [stroke], OK)
+    if stroke.cuts:
+        names = [f"{name}.{i}" for i in range(1, len(stroke.cuts) + 1)]
+        return Settled(names, stroke.pieces(), OK)
+    if stroke.status in LEAVES and task.style.on_border == "clip":
+        clipped = stroke.until_border()
+        # One pose is no stroke; of one that begins outside not even that is there.
+        if len(clipped.position) > 1:
+            return Settled([name], [clipped], OK)
+    return Settled([name], [stroke], stroke.status.said)
 
 
 def draw_part(job: Job, part: Part) -> Outcome:
@@ -186,17 +224,19 @@ def draw_part(job: Job, part: Part) -> Outcome:
     """
     task = job.task
     blocks = list(draw_blocks(task.skill, part.pairs, part.duration, task.surface, task.style))
-    if len(blocks) == 1 and task.reach is None and (blocks[0].status == Status.DRAWN).all():
+    plain = len(blocks) == 1 and task.reach is None and task.style.pace is None
+    if plain and (blocks[0].status == Status.DRAWN).all():
         outcome = Outcome(part.number, {}, {}, int(blocks[0].unfolded.sum()))
         drawn = trajectory.block_record(part.ids, blocks[0], job.provenance)
         return _written(job, part, outcome, drawn)
     raw = _in_order(blocks)
-    settled = settle(task, raw)
+    settled = settle(task, part.ids, raw)
     outcome = _outcome(job, part, raw, settled)
-    kept = [i for i, (_, status) in enumerate(settled) if status == OK]
+    kept = [one for one in settled if one.status == OK]
     if outcome.fatal or not kept:
         return outcome
-    ids, strokes = [part.ids[i] for i in kept], [settled[i][0] for i in kept]
+    ids = [name for one in kept for name in one.ids]
+    strokes = [stroke for one in kept for stroke in one.strokes]
     drawn = trajectory.trajectory_record(ids, strokes, job.provenance)
     return _written(job, part, outcome, drawn)
 
@@ -206,23 +246,30 @@ def _in_order(blocks: list[Block]) -> list[Stroke]:
     return [stroke for _, stroke in sorted(strokes, key=lambda entry: entry[0])]
 
 
-def _outcome(
-    job: Job, part: Part, drawn: list[Stroke], settled: list[tuple[Stroke, str]]
-) -> Outcome:
+def _outcome(job: Job, part: Part, drawn: list[Stroke], settled: list[Settled]) -> Outcome:
     """What became of a part of which not all strokes are to be written as they were drawn."""
     failed: dict[int, str] = {}
     clipped: dict[int, float] = {}
+    pieces: dict[int, list[PieceEnds]] = {}
+    style = job.task.style
     unfolded, fatal = 0, False
-    for row, before, (stroke, status) in zip(part.rows.tolist(), drawn, settled, strict=True):
-        if status != OK:
-            failed[row] = status
-            asked = stroke.status == Status.BORDER and job.task.on_border == "skip"
+    for row, before, one in zip(part.rows.tolist(), drawn, settled, strict=True):
+        if one.status != OK:
+            failed[row] = one.status
+            asked = before.status in LEAVES and style.on_border == "skip"
             fatal |= job.stop and not asked
             continue
-        if len(stroke.position) < len(before.position):
-            clipped[row] = float(stroke.timing.t[-1])
-        unfolded += 1 if stroke.unfolded else 0
-    return Outcome(part.number, failed, clipped, unfolded, fatal=fatal)
+        if before.cuts:
+            pieces[row] = [_ends(piece) for piece in one.strokes]
+        elif style.pace is not None or len(one.strokes[0].position) < len(before.position):
+            clipped[row] = float(one.strokes[0].timing.t[-1])
+        unfolded += 1 if one.strokes[0].unfolded else 0
+    return Outcome(part.number, failed, clipped, unfolded, fatal=fatal, pieces=pieces)
+
+
+def _ends(piece: Stroke) -> PieceEnds:
+    x, t = piece.position, piece.timing.t
+    return x[0].tolist(), x[-1].tolist(), float(t[-1] - t[0])
 
 
 def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:

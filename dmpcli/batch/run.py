@@ -1,7 +1,7 @@
 """One batch from its table of pairs to its manifest."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ from dmpcli.batch.folder import Folder
 from dmpcli.batch.job import Job, Outcome, Part, file_of
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import RefusedError
+from dmpcli.primitives.copies import ends
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.retiming import timing
 from dmpcli.records import manifest, trajectory
@@ -52,6 +53,8 @@ class Summary:
         Strokes that cross a sharp crease.
     kept : int
         Parts that an earlier run had drawn.
+    split : int
+        Pairs whose stroke was split.
     parts : int
     """
 
@@ -59,6 +62,7 @@ class Summary:
     failed: int = 0
     unfolded: int = 0
     kept: int = 0
+    split: int = 0
     parts: int = 0
 
 
@@ -160,22 +164,42 @@ class Batch:
         summary.drawn += size - len(outcome.failed)
         summary.failed += len(outcome.failed)
         summary.unfolded += outcome.unfolded
+        summary.split += len(outcome.pieces)
 
     def _table(self) -> Record:
-        """Return the table of pairs with what became of each."""
+        """Return the table of pairs with what became of each; one row for each piece of a split."""
         good = self.table.good
         names = [file_of(number) for number in range(len(self.table) // self.size + 1)]
         numbers = np.arange(len(self.table)) // self.size
         files = [names[n] if drawn else "" for n, drawn in zip(numbers.tolist(), good, strict=True)]
-        return trajectory.pairs_record(
-            self.table.ids,
-            self.pairs,
-            self._lasting(good),
-            self._normals(good),
-            files,
-            self.table.status,
-            self.job.provenance,
-        )
+        ids, pairs, lasting = self.table.ids, self._ends(good), self._lasting(good)
+        normals, status = self._normals(good), self.table.status
+        pieces = {k: v for outcome in self._outcomes.values() for k, v in outcome.pieces.items()}
+        if pieces:
+            counts = np.array([len(pieces.get(row, "1")) for row in range(len(ids))])
+            rows = np.repeat(np.arange(len(ids)), counts)
+            pairs, lasting, normals = pairs[rows], lasting[rows], normals[rows]
+            number = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+            for i, (row, n) in enumerate(zip(rows.tolist(), number.tolist(), strict=True)):
+                if row in pieces:
+                    pairs.start[i], pairs.goal[i], lasting[i] = pieces[row][n]
+            ids = [
+                f"{ids[row]}.{n + 1}" if row in pieces else ids[row]
+                for row, n in zip(rows.tolist(), number.tolist(), strict=True)
+            ]
+            files = [files[row] for row in rows.tolist()]
+            status = [status[row] for row in rows.tolist()]
+        p = self.job.provenance
+        return trajectory.pairs_record(ids, pairs, lasting, normals, files, status, p)
+
+    def _ends(self, good: Booleans) -> Pairs:
+        """Pairs with the ends that their strokes have themselves."""
+        if self.pairs.shift is None:
+            return self.pairs
+        task, rows = self.job.task, np.flatnonzero(good)
+        start, goal = self.pairs.start.copy(), self.pairs.goal.copy()
+        start[rows], goal[rows] = ends(task.skill, self.pairs[rows], task.surface, task.style.turn)
+        return replace(self.pairs, start=start, goal=goal)
 
     def _lasting(self, good: Booleans) -> Floats:
         """Duration of each trajectory with easing, s; where there is none, as it was asked."""

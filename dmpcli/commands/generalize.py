@@ -6,16 +6,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dmpcli.commands.options import SURFACES, Config, Point, Quiet, SurfacePose, SurfaceUnit
-from dmpcli.errors import InputError, RefusedError, counted
+from dmpcli.commands.process_options import (
+    Copies,
+    KeepOut,
+    Lead,
+    Margin,
+    Spacing,
+    Tilt,
+    ToolAcceleration,
+    ToolSpeed,
+)
+from dmpcli.errors import InputError, RefusedError
 
 if TYPE_CHECKING:
-    from dmpcli.batch.job import Task
     from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.primitives.drawing import Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
-    from dmpcli.records.record import Provenance
     from dmpcli.surfaces.protocol import Surface
 
 _PLACED = 100
@@ -68,7 +76,9 @@ def command(
     surface_unit: SurfaceUnit = None,
     on_border: Annotated[
         str,
-        typer.Option(help="A stroke that leaves the surface: fail, clip it there, or skip it."),
+        typer.Option(
+            help="A stroke that leaves the surface: fail, clip it there, split it, or skip it."
+        ),
     ] = "fail",
     duration: Annotated[
         float | None, typer.Option(help="Of the stroke, s. Default: as demonstrated.")
@@ -111,6 +121,14 @@ def command(
             show_default=False,
         ),
     ] = None,
+    lead: Lead = None,
+    tilt: Tilt = None,
+    tool_speed: ToolSpeed = None,
+    tool_acceleration: ToolAcceleration = None,
+    border_margin: Margin = None,
+    keep_out: KeepOut = None,
+    copies: Copies = None,
+    spacing: Spacing = None,
     on_error: Annotated[
         str | None,
         typer.Option(
@@ -154,7 +172,7 @@ def command(
 ) -> None:
     """Draw a skill at new start and goal points."""
     from dmpcli.batch.job import Task
-    from dmpcli.commands import batches, surface_input
+    from dmpcli.commands import batches, process_options, single, surface_input
     from dmpcli.commands.generalize_inputs import (
         facing_tool,
         in_base,
@@ -186,6 +204,13 @@ def command(
             "scale": scale,
             "turn": turn,
             "allow_stretch": allow_stretch,
+            "lead": lead,
+            "tilt": tilt,
+            "tool_speed": tool_speed,
+            "tool_acceleration": tool_acceleration,
+            "border_margin": border_margin,
+            "copies": copies,
+            "spacing": spacing,
         },
         preset,
         config,
@@ -196,13 +221,14 @@ def command(
     _check_together(
         pairs,
         (start_orientation, goal_orientation),
-        on_border,
         surface,
         {
             "--contact": contact,
             "--offset": offset,
         },
     )
+    leaving = process_options.leaving(on_border)
+    process_options.check(settings, orientation, surface, keep_out)
     surface_input.check_options(surface, surface_pose, surface_unit)
     _check_frame(in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
@@ -215,7 +241,7 @@ def command(
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     inputs = [{"role": "skill", "sha256": source.sha256}]
-    options = settings.model_dump()
+    options = settings.asked(settings.model_dump())
     found = read = None
     if surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
@@ -237,12 +263,16 @@ def command(
     if in_ == "part":
         table, options = in_base(table, read), options | {"in": in_}
     _check_asked(learned, table, settings)
+    process_options.check_skill(settings, learned, table, keep_out)
+    table = process_options.copied(table, settings)
     given = None if found is None else facing_tool(found, learned, table, str(surface), quiet)
     style = style_of(settings.style(), learned, given, settings.contact, settings.offset)
+    style = process_options.process_style(style, settings, leaving, given, keep_out, inputs, quiet)
     said = mark(learned, streams.shown(skill))
     if said is not None:
         warn(said)
-    if learned.surface is not None and learned.oriented and settings.orientation == "keep":
+    keeps = settings.orientation == "keep" and settings.inclination is None
+    if learned.surface is not None and learned.oriented and keeps:
         tell(
             "the skill was taught on a surface: its tool turns as it did against that one, about "
             "the axes of the taught start; --orientation surface turns it with this one",
@@ -253,10 +283,10 @@ def command(
     _judge(learned, table, given, settings, style, wanted.stop, read, in_ == "part")
     taught = lesson.of_skill(file).facts()
     provenance = Provenance("generalize", options, tuple(inputs), taught)
-    task = Task(learned, given, style, on_border, reach)
+    task = Task(learned, given, style, reach)
     lasting = _durations(learned, table, settings)
     if pairs is None:
-        _write_one(task, table, lasting, provenance, output, quiet)
+        single.write(task, table, lasting, provenance, output, quiet)
     else:
         batches.write(task, table, lasting, provenance, output, wanted, quiet)
 
@@ -264,7 +294,6 @@ def command(
 def _check_together(
     pairs: Path | None,
     orientations: tuple[Point | None, Point | None],
-    on_border: str,
     surface: Path | None,
     of_surface: dict[str, Any],
 ) -> None:
@@ -274,8 +303,6 @@ def _check_together(
             "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
             "--start-orientation and --goal-orientation out"
         )
-    if on_border not in ("fail", "clip", "skip"):
-        raise InputError(f"--on-border {on_border}: must be fail, clip or skip")
     alone = [name for name, value in of_surface.items() if value is not None]
     if surface is None and alone:
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
@@ -391,68 +418,3 @@ def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings
 
     default = settings.duration or skill.duration
     return np.where(np.isnan(table.duration), default, table.duration)
-
-
-def _remedy(status: str, on_surface: bool) -> str:
-    """What to do about a stroke that the arm cannot reach or follow."""
-    if "duration" in status:  # too fast for a joint
-        return "give a longer --duration"
-    return "move start and goal" + (", or choose another surface" if on_surface else "")
-
-
-def _write_one(
-    task: "Task",
-    table: "PairTable",
-    duration: Any,
-    provenance: "Provenance",
-    output: Path,
-    quiet: bool,
-) -> None:
-    from dataclasses import replace
-
-    import numpy as np
-
-    from dmpcli.batch.job import settle
-    from dmpcli.commands.messages import about, tell, warn
-    from dmpcli.primitives.admission import snapped
-    from dmpcli.primitives.contact_heights import end_heights
-    from dmpcli.primitives.drawing import draw, seen_from
-    from dmpcli.records import record, streams, trajectory
-    from dmpcli.records.pairs import OK
-
-    given = task.surface
-    pairs = table.pairs if given is None else snapped(table.pairs, given)
-    with about("skill"):
-        [drawn] = draw(task.skill, pairs, duration, given, task.style)
-    [(stroke, status)] = settle(task, [drawn])
-    if status != OK:
-        whole = status == stroke.status.said
-        raise RefusedError(status if whole else f"{status}; {_remedy(status, given is not None)}")
-    seen, heights = seen_from(task.skill, task.style, pairs, given)
-    ends = end_heights(seen, heights)
-    facts = (
-        provenance.facts
-        | trajectory.facts_of(seen, task.style, heights)
-        | trajectory.facts_of_stroke(stroke, task.style.rate, pairs.start[0], pairs.goal[0])
-    )
-    done = trajectory.trajectory_record(table.ids, [stroke], replace(provenance, facts=facts))
-    streams.write(output, record.encode(done))
-    if given is not None:
-        moved = np.linalg.norm(
-            [pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2
-        )
-        tell(
-            f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface",
-            quiet,
-        )
-    if stroke.unfolded:
-        warn("the stroke crosses a sharp crease, where no tool can follow the surface")
-    if len(stroke.position) < len(drawn.position):
-        warn(f"clipped at the border: {len(stroke.position)} of {len(drawn.position)} poses")
-    miss = np.linalg.norm(stroke.position[-1] - stroke.above(pairs.goal[0], ends[1]))
-    tell(
-        f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
-        f"{counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "
-        f"{task.style.rate:g} Hz, ends {miss:.4f} mm from the goal",
-        quiet,
-    )

@@ -1,6 +1,6 @@
 """Which pairs a skill can be carried to, before anything is rolled out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -174,7 +174,7 @@ def most_stretch(skill: Skill) -> float:
 def snapped(pairs: Pairs, given: Surface) -> Pairs:
     """Return the pairs with start and goal moved to their closest points of the surface."""
     start, goal = given.closest(pairs.start).position, given.closest(pairs.goal).position
-    return Pairs(start, goal, pairs.start_rotation, pairs.goal_rotation)
+    return replace(pairs, start=start, goal=goal)
 
 
 def tool_axis(skill: Skill, pairs: Pairs) -> Floats | None:

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.primitives import own_timing
 from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.primitives.generalization import (
     Amplitude,
@@ -16,10 +18,15 @@ from dmpcli.primitives.generalization import (
     curves,
     roll_out,
 )
+from dmpcli.primitives.inclination import Inclination
 from dmpcli.primitives.retiming import Timing, timing
 from dmpcli.primitives.skill import Skill
+from dmpcli.primitives.tool_speed import Pace
+from dmpcli.surfaces.keep_off import KeepOff
 from dmpcli.surfaces.plane import Plane, pair_charts
 from dmpcli.surfaces.protocol import Charts, Status, Surface, towards
+
+OnBorder = Literal["fail", "clip", "skip", "split"]
 
 # A surface that passes so near the taught start, mm, with its normal but for so small an angle
 # (cosine), is the one that the skill was taught on.
@@ -47,6 +54,14 @@ class Style:
         Of closed strokes about the normal at their start, rad.
     allow_stretch : bool
         Whether start and goal may lie at any distance, however it distorts the stroke.
+    inclination : Inclination or None
+        How the tool leans, from the surface's normal; it then turns with the surface.
+    pace : Pace or None
+        How fast the tool goes along the path; None keeps the skill's own timing.
+    keep_off : KeepOff or None
+        Where on the surface no stroke may be.
+    on_border : {'fail', 'clip', 'skip', 'split'}
+        What becomes of a stroke that leaves the surface, or comes where it may not be.
     """
 
     rate: float = 50.0
@@ -59,6 +74,10 @@ class Style:
     size: float = 1.0
     turn: float = 0.0
     allow_stretch: bool = False
+    inclination: Inclination | None = None
+    pace: Pace | None = None
+    keep_off: KeepOff | None = None
+    on_border: OnBorder = "fail"
 
 
 @dataclass(frozen=True)
@@ -82,6 +101,8 @@ class Stroke:
         Samples beyond the surface's border.
     unfolded : bool
         Whether it crosses a sharp crease, where a tool cannot follow the surface.
+    cuts : tuple of (int, int)
+        Of a stroke that is split: where each piece begins, and where what follows it begins.
     """
 
     timing: Timing
@@ -91,6 +112,7 @@ class Stroke:
     status: Status
     outside: Booleans
     unfolded: bool
+    cuts: tuple[tuple[int, int], ...] = ()
 
     def above(self, goal: Floats, height: float) -> Floats:
         """Return the point (3,) at a height over the goal, along the last normal, mm."""
@@ -102,14 +124,26 @@ class Stroke:
         """Return the part before the first sample beyond the border; at least one sample."""
         inside = np.broadcast_to(~self.outside, len(self.position))
         count = max(1, int(np.argmin(inside)) if not inside.all() else len(inside))
-        t = replace(self.timing, t=self.timing.t[:count], stroke=self.timing.stroke[:count])
-        euler = None if self.euler is None else self.euler[:count]
-        normal = self.normal
+        return self._part(0, count)
+
+    def pieces(self) -> list["Stroke"]:
+        """Return the pieces of a stroke that is split, each from its own t = 0 on."""
+        found = []
+        for first, end in self.cuts:
+            piece = self._part(first, end)
+            t = self.timing.t[: end - first]
+            found.append(replace(piece, timing=replace(piece.timing, t=t)))
+        return found
+
+    def _part(self, first: int, end: int) -> "Stroke":
+        t = replace(self.timing, t=self.timing.t[first:end], stroke=self.timing.stroke[first:end])
+        euler = None if self.euler is None else self.euler[first:end]
+        normal, outside = self.normal, self.outside
         if normal is not None and len(normal) > 1:
-            normal = normal[:count]
-        return Stroke(
-            t, self.position[:count], euler, normal, Status.DRAWN, self.outside[:count], False
-        )
+            normal = normal[first:end]
+        if len(outside) > 1:
+            outside = outside[first:end]
+        return Stroke(t, self.position[first:end], euler, normal, Status.DRAWN, outside, False)
 
 
 @dataclass(frozen=True)
@@ -132,6 +166,8 @@ class Block:
         `Status`.
     outside : array of bool, shape (B, 1 or T)
     unfolded : array of bool, shape (B,)
+    cuts : tuple of (int, int)
+        Of all its strokes; see `Stroke`.
     """
 
     rows: Integers
@@ -142,6 +178,7 @@ class Block:
     status: Integers
     outside: Booleans
     unfolded: Booleans
+    cuts: tuple[tuple[int, int], ...] = ()
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -156,6 +193,20 @@ class Block:
             Status(self.status[i]),
             self.outside[i],
             bool(self.unfolded[i]),
+            self.cuts,
+        )
+
+    def some(self, of: Integers) -> "Block":
+        """Return some of the strokes."""
+        return replace(
+            self,
+            rows=self.rows[of],
+            position=self.position[of],
+            euler=None if self.euler is None else self.euler[of],
+            normal=None if self.normal is None else self.normal[of],
+            status=self.status[of],
+            outside=self.outside[of],
+            unfolded=self.unfolded[of],
         )
 
 
@@ -227,7 +278,21 @@ def draw_blocks(
             rows = np.flatnonzero((duration == seconds) & (over == other))
             seen = skill.turned_over() if other else skill
             heights = style.heights_over if other else style.heights
-            yield _drawn(seen, rows, pairs[rows], when, surface, style, heights)
+            yield from own_timing.applied(
+                _drawn(seen, rows, pairs[rows], when, surface, style, heights),
+                seen,
+                style,
+                _redraw(seen, pairs, surface, heights),
+            )
+
+
+def _redraw(
+    skill: Skill, pairs: Pairs, surface: Surface | None, heights: ContactHeights | None
+) -> own_timing.Redraw:
+    def redraw(rows: Integers, when: Timing, style: Style) -> Block:
+        return _drawn(skill, rows, pairs[rows], when, surface, style, heights)
+
+    return redraw
 
 
 def turned_over(skill: Skill, pairs: Pairs, surface: Surface | None) -> Booleans:
@@ -274,21 +339,26 @@ def _drawn(
     shared = curves(skill, when.stroke, heights)
     with np.errstate(over="ignore", invalid="ignore"):
         drawn = roll_out(
-            skill, shared, pairs, charts, style.amplitude, style.orientation, style.size
+            skill,
+            shared,
+            pairs,
+            charts,
+            style.amplitude,
+            style.orientation if style.inclination is None else "surface",
+            style.size,
+            style.inclination,
         )
     lift, count = drawn.lift, len(pairs)
     if not _finite(drawn):
         raise InputError("the skill's numbers give no finite stroke; fit it again")
     if lift is not None:
+        outside, status = lift.outside, lift.status
+        if style.on_border == "split" and lift.unsound is not None:
+            outside = outside | lift.unsound
+        if style.keep_off is not None:
+            outside, status = style.keep_off.marked(drawn.position, outside, status)
         return Block(
-            rows,
-            when,
-            drawn.position,
-            drawn.euler,
-            lift.normal,
-            lift.status,
-            lift.outside,
-            lift.unfolded,
+            rows, when, drawn.position, drawn.euler, lift.normal, status, outside, lift.unfolded
         )
     flat = surface is None or isinstance(surface, Plane)
     normal = surface.normal if isinstance(surface, Plane) else skill.frame.normal

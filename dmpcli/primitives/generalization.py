@@ -9,6 +9,7 @@ from dmpcli import rotations
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import RefusedError
 from dmpcli.primitives.contact_heights import ContactHeights
+from dmpcli.primitives.inclination import Inclination, inclined
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.orientation import smoothed
 from dmpcli.surfaces.plane import PlaneCharts
@@ -33,12 +34,15 @@ class Pairs:
         mm.
     start_rotation, goal_rotation : array, shape (B, 3, 3), or None
         Tool orientations where they are asked for; None takes the demonstration's.
+    shift : array, shape (B,), optional
+        How far each stroke is drawn beside its start and goal, along v of their chart, mm.
     """
 
     start: Floats
     goal: Floats
     start_rotation: Floats | None = None
     goal_rotation: Floats | None = None
+    shift: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.start)
@@ -52,6 +56,7 @@ class Pairs:
             self.goal[rows],
             part(self.start_rotation),
             part(self.goal_rotation),
+            part(self.shift),
         )
 
 
@@ -117,6 +122,7 @@ def roll_out(
     amplitude: Amplitude = "keep",
     orientation: Orientation = "keep",
     size: float = 1.0,
+    inclination: Inclination | None = None,
 ) -> Trajectories:
     """Draw a skill at new pairs: modified DMP (9)-(11) in charts, original (4)-(8) in the base.
 
@@ -135,6 +141,8 @@ def roll_out(
         Whether the tool turns as demonstrated in base axes, or with the chart.
     size : float
         Of a closed stroke, beside the demonstrated one.
+    inclination : Inclination, optional
+        How the tool leans; without it as it was taught.
 
     Returns
     -------
@@ -149,7 +157,7 @@ def roll_out(
     else:
         scale = _modified_scale(skill, charts.goals, amplitude, size)
         goal = _reaching(skill, charts.goals, scale[:, :3], shared[:5])
-        lift = _lift(charts, goal, scale, shared)
+        lift = _lift(charts, goal, scale, shared, pairs.shift)
         position = lift.position
         frames = skill.frame.axes[None, None]
         if orientation == "surface":
@@ -159,6 +167,9 @@ def roll_out(
         turn = _turn(skill, pairs, frames, turned=orientation == "surface" and lift is not None)
         turn = _ending(skill, turn, scale, shared)
         euler = np.broadcast_to(_euler(turn, shared, scale), position.shape)
+        if inclination is not None and lift is not None:
+            leaning = frames if orientation == "surface" else lift.axes
+            euler = inclined(euler, leaning, position, inclination)
     return Trajectories(position, euler, lift)
 
 
@@ -237,9 +248,16 @@ def _combined(coefficients: Floats, shared: Floats) -> Floats:
     return flat.reshape(3, count, -1).transpose(1, 2, 0)
 
 
-def _lift(charts: Charts, goal: Floats, scale: Floats, shared: Floats) -> Lift:
+def _lift(
+    charts: Charts, goal: Floats, scale: Floats, shared: Floats, shift: Floats | None
+) -> Lift:
     if not isinstance(charts, PlaneCharts):
-        return charts.lift(_combined(_coefficients(np.zeros_like(goal), goal, scale), shared))
+        coordinates = _combined(_coefficients(np.zeros_like(goal), goal, scale), shared)
+        if shift is not None:
+            coordinates[..., 1] += shift[:, None]
+        return charts.lift(coordinates)
+    if shift is not None:
+        charts = replace(charts, origin=charts.origin + shift[:, None] * charts.axes[..., 1])
     position = _combined(_in_base(charts, goal, scale), shared)
     position[:, 0] = _first(charts, scale, shared)
     count = len(charts)

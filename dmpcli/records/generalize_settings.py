@@ -7,13 +7,13 @@ from pydantic import Field
 
 from dmpcli.primitives.drawing import Style
 from dmpcli.primitives.generalization import Amplitude, Orientation
-from dmpcli.records.settings import Settings
+from dmpcli.records.process_settings import ProcessSettings
 
 NotNegative = Annotated[float, Field(ge=0, le=86_400)]
 
 
-class GeneralizeSettings(Settings):
-    """How to draw a skill at new pairs.
+class GeneralizeSettings(ProcessSettings):
+    """How to draw a skill at new pairs; what a process asks for beside is in `ProcessSettings`.
 
     Attributes
     ----------

@@ -73,6 +73,14 @@ def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) ->
     return facts
 
 
+def facts_of_several(stroke: Stroke, rate: float) -> dict[str, Any]:
+    """Return what is so for all strokes of one file, of which this is one: rate and plane."""
+    facts: dict[str, Any] = {"rate": rate}
+    if stroke.normal is not None and len(stroke.normal) == 1:
+        facts["normal"] = stroke.normal[0].tolist()
+    return facts
+
+
 def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenance) -> Record:
     """Return the record of several strokes, one after the other.
 

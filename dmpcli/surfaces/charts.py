@@ -115,7 +115,17 @@ class MeshCharts:
         self._walk_facets(np.flatnonzero(unfolded), feet, axes, status)
         self._try_facets(unfolded, feet, axes, status)
         position = foot + coordinates[..., 2:] * axes[..., 2]
-        return Lift(position, axes, outside, status, unfolded)
+        unsound = self._unsound(np.flatnonzero(status == Status.BORDER), feet)
+        return Lift(position, axes, outside, status, unfolded, unsound)
+
+    def _unsound(self, left: Integers, feet: last_check.Feet) -> Booleans | None:
+        """Points (B, T) that are wrong of strokes that left the surface; None where none did."""
+        if len(left) == 0:
+            return None
+        some = self._some(left, feet)
+        unsound = np.zeros(feet.outside.shape, dtype=bool)
+        unsound[left] = last_check.unsound(self.mesh, some)
+        return unsound
 
     def _check(self, rows: Integers, feet: last_check.Feet, status: Integers) -> None:
         """Put what is wrong with some of the strokes that were drawn into their status."""
@@ -177,6 +187,12 @@ class MeshCharts:
 
     def _checked(self, rows: Integers, feet: last_check.Feet) -> Integers:
         """What is wrong with some of the strokes, as `Status`."""
+        some = self._some(rows, feet)
+        origin = self.centre.origin[rows]
+        return last_check.refusals(self.mesh, some, origin, self.target[rows], self.goals[rows])
+
+    def _some(self, rows: Integers, feet: last_check.Feet) -> last_check.Feet:
+        """Return some of the strokes, with their facets."""
         some = feet
         if len(rows) < len(self):
             some = last_check.Feet(*(getattr(feet, field.name)[rows] for field in fields(feet)))
@@ -185,8 +201,7 @@ class MeshCharts:
             walked = some.position[unknown]
             found = self.mesh.search(walked.reshape(-1, 3))[1]
             some.face[unknown] = found.reshape(walked.shape[:2])
-        origin = self.centre.origin[rows]
-        return last_check.refusals(self.mesh, some, origin, self.target[rows], self.goals[rows])
+        return some
 
     def _crosses_noise(self, foot: Floats) -> Booleans:
         """Tell which strokes (R, T, 3) on the mesh come over noisy facets, shape (R,)."""

@@ -81,6 +81,21 @@ def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats)
     return np.select(which, what, np.int64(Status.DRAWN))
 
 
+def unsound(mesh: Mesh, feet: Feet) -> Booleans:
+    """Tell which points (B, T) of strokes are wrong, whether or not they come after a border.
+
+    Of a torn stroke these are both points beside the tear.
+    """
+    jumps = _jumps(feet)
+    plane = mesh.planes[feet.face]
+    wrong = _off(plane, feet) > _ON
+    wrong[:, 1:] |= jumps
+    wrong[:, :-1] |= jumps
+    rows, samples = _leaning(mesh, plane, feet, ~feet.outside)
+    wrong[rows, samples] = True
+    return wrong
+
+
 def shorter_than_chord(mesh: Mesh, start: Floats, goal: Floats, lengths: Floats) -> Booleans:
     """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise."""
     chord = length(goal - start)[:, 0]
@@ -91,11 +106,16 @@ def shorter_than_chord(mesh: Mesh, start: Floats, goal: Floats, lengths: Floats)
 
 
 def _torn(feet: Feet, on: Booleans) -> Booleans:
+    return np.asarray(np.any(_jumps(feet) & on[:, 1:], axis=1))
+
+
+def _jumps(feet: Feet) -> Booleans:
+    """Tell which steps are longer than any can be, shape (B, T - 1)."""
     move = length(np.diff(feet.position, axis=1))[..., 0]
     change = np.diff(feet.coordinates[..., :2], axis=1)
     stretch = np.maximum(np.abs(feet.stretch[:, 1:]), np.abs(feet.stretch[:, :-1]))
     flat = np.hypot(change[..., 0] * stretch, change[..., 1])
-    return np.asarray(np.any((move > _TIMES * flat + _MORE) & on[:, 1:], axis=1))
+    return np.asarray(move > _TIMES * flat + _MORE)
 
 
 def _missed(
@@ -110,18 +130,29 @@ def _missed(
 
 
 def _beside(plane: Floats, feet: Feet, on: Booleans) -> Booleans:
+    return np.asarray(np.any((_off(plane, feet) > _ON) & on, axis=1))
+
+
+def _off(plane: Floats, feet: Feet) -> Floats:
+    """Distances of points from the planes of their facets, mm, shape (B, T)."""
     off = np.einsum("bti,bti->bt", feet.position, plane[..., :3]) - plane[..., 3]
-    return np.asarray(np.any((np.abs(off) > _ON) & on, axis=1))
+    return np.asarray(np.abs(off))
 
 
 def _tilted(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
+    tilted = np.zeros(len(feet.face), dtype=bool)
+    tilted[_leaning(mesh, plane, feet, on)[0]] = True
+    return tilted
+
+
+def _leaning(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> tuple[Integers, Integers]:
+    """Rows and samples of the points whose normals lean off their facets outside noise."""
     lean = np.abs(np.einsum("bti,bti->bt", feet.normal, plane[..., :3]))
     rows, samples = np.nonzero((lean < _TILTED) & on)
     smooth = mesh.noise[feet.face[rows, samples]] == 0.0
     rows, samples = rows[smooth], samples[smooth]
-    tilted = np.zeros(len(feet.face), dtype=bool)
     if len(rows) == 0:
-        return tilted
+        return rows, samples
     position, normal = feet.position[rows, samples], feet.normal[rows, samples]
     face = feet.face[rows, samples]
     # A point of an edge is on either facet.
@@ -130,5 +161,5 @@ def _tilted(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
     holds = np.abs(dot(normal[:, None], flat)[..., 0]) >= _TILTED
     holds &= np.abs(dot(position[:, None] - corner, flat)[..., 0]) < _SAME
     holds &= either >= 0
-    tilted[rows[~holds.any(axis=1)]] = True
-    return tilted
+    leans = ~holds.any(axis=1)
+    return rows[leans], samples[leans]

@@ -35,15 +35,21 @@ def smoothed(axes: Floats, position: Floats, width: float = WIDTH) -> Floats:
     """
     if width <= 0.0 or axes.shape[1] < 3:
         return axes
-    steps = length(np.diff(position, axis=1))[..., 0]
-    arc = np.concatenate([np.zeros((len(axes), 1)), np.cumsum(steps, axis=1)], axis=1)
-    # Three averages over ± half-width a have the variance a².
     values = np.concatenate([axes[..., 1], axes[..., 2]], axis=-1)
-    for _ in range(_PASSES):
-        values = _averaged(arc, values, width)
+    values = smoothed_vectors(values, position, width)
     n = unit(values[..., 3:])
     e_v = across(values[..., :3], n)
     return np.stack([cross(e_v, n), e_v, n], axis=-1)
+
+
+def smoothed_vectors(values: Floats, position: Floats, width: float = WIDTH) -> Floats:
+    """Values (B, T, C) smoothed along paths (B, T, 3), mm, as `smoothed` does it."""
+    steps = length(np.diff(position, axis=1))[..., 0]
+    arc = np.concatenate([np.zeros((len(values), 1)), np.cumsum(steps, axis=1)], axis=1)
+    # Three averages over ± half-width a have the variance a².
+    for _ in range(_PASSES):
+        values = _averaged(arc, values, width)
+    return values
 
 
 def _averaged(arc: Floats, values: Floats, half: float) -> Floats:

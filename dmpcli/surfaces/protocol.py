@@ -31,6 +31,8 @@ class Status(IntEnum):
     MISSED = 10
     TILTED = 11
     OPPOSITE = 12
+    NEAR_BORDER = 20
+    KEPT_OUT = 21
 
     @property
     def reason(self) -> str:
@@ -92,7 +94,19 @@ _WORDS = {
         "start and goal are opposite points of the sphere, so that every heading leads there",
         "move one of them a little, to where the stroke is to run",
     ),
+    Status.NEAR_BORDER: (
+        "the stroke comes nearer to the border than --border-margin allows",
+        "move start and goal inwards, or draw until there with --on-border clip",
+    ),
+    Status.KEPT_OUT: (
+        "the stroke enters a region of --keep-out",
+        "move start and goal, or draw around it with --on-border split",
+    ),
 }
+
+
+LEAVES = (Status.BORDER, Status.NEAR_BORDER, Status.KEPT_OUT)
+"""Of strokes that are drawable where they are not outside."""
 
 
 @dataclass(frozen=True)
@@ -171,6 +185,8 @@ class Lift:
         where not `outside`.
     unfolded : array of bool, shape (B,)
         Pairs that cross a sharp crease and were walked from face to face.
+    unsound : array of bool, shape (B, T), optional
+        Of strokes that left the surface and came back: points that are not where they should be.
     """
 
     position: Floats
@@ -178,6 +194,7 @@ class Lift:
     outside: Booleans
     status: Integers
     unfolded: Booleans
+    unsound: Booleans | None = None
 
     @property
     def normal(self) -> Floats:

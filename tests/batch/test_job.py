@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dmpcli.batch import workers
-from dmpcli.batch.job import Job, Task, settle
+from dmpcli.batch.job import Job, Settled, Task, settle
 from dmpcli.batch.run import Batch
 from dmpcli.errors import RefusedError
 from dmpcli.primitives.choices import Choices
@@ -42,7 +42,7 @@ def table_of(*ends):
 
 def write(folder, skill, mesh, table, on_border, stop=True):
     form, provenance = Form(), Provenance("generalize")
-    job = Job(Task(skill, mesh, Style(), on_border), stop, provenance, form, str(folder))
+    job = Job(Task(skill, mesh, Style(on_border=on_border)), stop, provenance, form, str(folder))
     lasting = np.full(len(table), skill.duration)
     done = []
     Batch(job, table, table.pairs, lasting, 2000).run(workers.here, done.append)
@@ -55,9 +55,10 @@ def test_settled_clips_skips_or_refuses(skill, mesh):
     inside, over = draw(skill, table.pairs, lasting, mesh, Style())
     assert over.status == Status.BORDER
     for on_border in ("fail", "clip", "skip"):
-        task = Task(skill, mesh, Style(), on_border)
-        assert settle(task, [inside]) == [(inside, OK)]
-        [(kept, status)] = settle(task, [over])
+        task = Task(skill, mesh, Style(on_border=on_border))
+        assert settle(task, ["a"], [inside]) == [Settled(["a"], [inside], OK)]
+        [one] = settle(task, ["b"], [over])
+        [kept], status = one.strokes, one.status
         assert (status == OK) == (on_border == "clip")
         assert len(kept.position) < len(over.position) or on_border != "clip"
         assert np.abs(kept.position[:, 1]).max() <= 75.0 + 1e-6 or on_border != "clip"
