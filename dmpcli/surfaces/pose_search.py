@@ -24,8 +24,7 @@ _SAME = 0.05
 """... by more than this at a touched point, mm."""
 _SETTLED = 1e-9
 """A step that changes the sum of squares by less than this part of it is the last."""
-_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
-# Frequencies of the super-Fibonacci spiral on SO(3): the plastic-like root psi^4 = psi + 4.
+# Frequency of the super-Fibonacci spiral on SO(3): the root of psi^4 = psi + 4.
 _PSI = 1.533751168755204288118041
 
 
@@ -96,7 +95,7 @@ def near(
     """
     from scipy.stats import qmc
 
-    cube = qmc.Halton(6, scramble=False).random(count - 1 + 1)[1:]
+    cube = qmc.Halton(6, scramble=False).random(count)[1:]
     steps = np.concatenate(
         [
             np.zeros((1, 6)),
