@@ -10,7 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.measures.smoothness import CUTOFF
+from dmpcli.measures.low_pass import zero_phase
+from dmpcli.measures.smoothness import CUTOFF, ORDER
 
 _THRESHOLD, _PADDING = 0.05, 4
 _FEW = 0.3
@@ -134,19 +135,7 @@ def _even(t: Floats, position: Floats) -> tuple[float, Floats]:
         p = p[..., i] + share * (p[..., i + 1] - p[..., i])
     if 0.45 / dt <= CUTOFF:
         return dt, p
-    # Costs more than a second to import; only here.
-    from scipy.signal import sosfiltfilt
-
-    sections = _low_pass(dt)
-    ringing = min(n - 1, round(10.0 / (CUTOFF * dt)))
-    return dt, np.asarray(sosfiltfilt(sections, p, axis=-1, padlen=ringing))
-
-
-@lru_cache(maxsize=16)
-def _low_pass(dt: float) -> Floats:
-    from scipy.signal import butter
-
-    return np.asarray(butter(6, CUTOFF, fs=1.0 / dt, output="sos"))
+    return dt, zero_phase(p, CUTOFF * dt, ORDER)
 
 
 def _norm(vectors: Floats) -> Floats:

@@ -13,9 +13,13 @@ References
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.measures.low_pass import zero_phase
 
 CUTOFF = 10.0
 """Hz: above it a hand's movement holds noise only [3]; the same for files of every rate."""
+
+ORDER = 6
+"""Of the Butterworth low-pass, in one direction."""
 
 
 def log_dimensionless_jerk(t: Floats, position: Floats, cutoff: float | None = CUTOFF) -> float:
@@ -104,9 +108,4 @@ def _even(t: Floats, position: Floats, cutoff: float | None) -> tuple[float, Flo
         p = np.column_stack([np.interp(even, t, column) for column in position.T])
     if cutoff is None or cutoff >= 0.45 / dt:
         return dt, p
-    # Costs more than a second to import; only here.
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(6, cutoff, fs=1.0 / dt, output="sos")
-    ringing = min(n - 1, round(10.0 / (cutoff * dt)))
-    return dt, np.asarray(sosfiltfilt(sections, p, axis=0, padlen=ringing))
+    return dt, np.ascontiguousarray(zero_phase(p.T, cutoff * dt, ORDER).T)

@@ -96,7 +96,7 @@ _WORDS = {
     ),
     Status.NEAR_BORDER: (
         "the stroke comes nearer to the border than --border-margin allows",
-        "move start and goal inwards, or draw until there with --on-border clip",
+        "lower the margin, move start and goal inwards, or draw the rest with --on-border split",
     ),
     Status.KEPT_OUT: (
         "the stroke enters a region of --keep-out",
