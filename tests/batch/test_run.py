@@ -66,6 +66,7 @@ def whole(learned, tmp_path_factory):
     return table, content(place / "batch")
 
 
+@pytest.mark.slow
 def test_part_n_holds_the_pairs_of_part_n_in_order_and_the_manifest_says_so(whole):
     files = whole[1]
     assert sorted(files) == [
@@ -85,6 +86,7 @@ def test_part_n_holds_the_pairs_of_part_n_in_order_and_the_manifest_says_so(whol
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [("--jobs", 2), ("--jobs", 5)])
 def test_the_number_of_processes_does_not_change_a_byte(learned, whole, tmp_path, options):
     table, files = whole
@@ -119,6 +121,7 @@ def test_a_shard_leaves_alone_what_another_one_is_writing(learned, whole, tmp_pa
     assert content(folder) == files
 
 
+@pytest.mark.slow
 def test_a_resumed_run_keeps_whole_parts_and_draws_the_others_again(learned, whole, tmp_path):
     table, files = whole
     folder = tmp_path / "b"

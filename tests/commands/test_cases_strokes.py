@@ -111,6 +111,7 @@ def warnings(said):
 # Repetitive strokes, letters, corners: as many functions as they take.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("regression", ["lwr", "ridge"])
 def test_twenty_loops_keep_their_height(lab, regression):
     _, said, drawn, recorded = learned(lab, "loops", "--regression", regression)
@@ -127,6 +128,7 @@ def test_two_hundred_waves_keep_their_height_by_ridge(lab):
     assert document["basis"] <= 2000
 
 
+@pytest.mark.slow
 def test_two_hundred_waves_keep_their_height_by_lwr_or_ridge_is_named(lab):
     _, said, drawn, _ = learned(lab, "waves")
     told = re.search(r"--regression ridge reaches RMS .* with N = \d+", said)
@@ -452,6 +454,7 @@ def on_saddle(uv):
     return SADDLE.strip(start[None], first[None], flat[None], STEPS)[0][0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taught", ["on_saddle 0", "on_saddle 40", "on_bow 600", "on_bow -600"])
 def test_what_is_taught_on_a_curved_part_is_drawn_on_any(lab, saddle, taught):
     kind, number = taught.split()

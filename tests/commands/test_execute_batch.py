@@ -120,6 +120,7 @@ def goal_of(name, place):
     return np.array([cols[axis][-1] for axis in "xyz"])
 
 
+@pytest.mark.slow
 def test_all_strokes_are_drawn_in_pair_order_as_planned(drawn):
     ids = [name for name in drawn.columns["id"] if name is not None]
     assert list(dict.fromkeys(ids)) == list(PLACES)

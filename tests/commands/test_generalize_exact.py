@@ -135,6 +135,7 @@ def test_batches_on_a_cylinder_equal_each_pair_alone_in_any_number_of_processes(
     np.testing.assert_allclose(together, alone, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", [TOP, FLOOR], ids=["outside", "pipe"])
 def test_report_measures_and_pictures_strokes_on_a_cylinder(learned, tube, tmp_path, pair):
     run(learned, "-o", tmp_path / "t", *pair, "--surface", tube, "--orientation", "surface")

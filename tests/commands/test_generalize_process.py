@@ -170,6 +170,7 @@ def test_a_margin_refuses_what_comes_nearer_and_takes_what_does_not(shop, tmp_pa
     assert "--border-margin" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", ["plane.json", "cylinder.json", "sphere.json", "box.stl"])
 def test_the_tool_s_speed_is_held_and_the_path_is_the_same(shop, tmp_path, surface):
     y = [-20.0, -10.0]
@@ -224,6 +225,7 @@ def test_lead_and_tilt_are_those_against_the_normals_of_the_file(shop, tmp_path,
         np.testing.assert_allclose(found.stack(["nx", "ny", "nz"]), normal, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_copies_over_the_edge_are_refused_skipped_split_or_clipped(shop, tmp_path):
     # The third copy swings over the edge of the plate, the fourth begins beyond it.
     options = [*FREE, "--surface", shop / "plate.ply", "--copies", 4, "--spacing", -10]
@@ -240,6 +242,7 @@ def test_copies_over_the_edge_are_refused_skipped_split_or_clipped(shop, tmp_pat
         assert ids is None or list(strokes(out)[0]) == ids
 
 
+@pytest.mark.slow
 def test_a_batch_does_all_of_it_at_once_with_the_same_bytes_for_any_number_of_jobs(shop, tmp_path):
     options = [
         "--pairs", shop / "pairs.csv", "--surface", shop / "plate.ply", "--on-border", "split",

@@ -160,6 +160,7 @@ def test_a_frame_that_says_nothing_is_refused(lab, args, words):
     assert words in done.stderr
 
 
+@pytest.mark.slow
 def test_report_says_where_the_surface_is_instead(lab):
     assert drawn(*ends(IN_BASE), "--surface", "part.obj", *POSE).exit_code == 0
     done = run("report", "t.parquet", "--surface", "part.obj", "--surface-pose", *METRES, "-q")

@@ -209,6 +209,7 @@ def test_without_a_guess_all_orientations_are_searched(wedge_lab):
     assert "at every point of the part (95 %)" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedge_lab):
     bad = [900, 300, -200, 2.2, 1.0, -1]
     done = run("wedge.stl", "on.csv", "-o", "pose.json", "--initial", *bad, "-q")
@@ -217,6 +218,7 @@ def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedg
     assert_wedge(wedge_lab)
 
 
+@pytest.mark.slow
 def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(wedge_lab):
     points = touched.read(streams.read(wedge_lab / "on.csv"))
     part = Part.of(Mesh(*wedge()))
@@ -232,6 +234,7 @@ def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(
     assert_wedge(wedge_lab)
 
 
+@pytest.mark.slow
 def test_a_part_that_looks_the_same_turned_over_is_refused_from_a_bad_start(lab):
     over = Rotation.from_matrix(R @ np.diag([-1.0, 0.6, -0.6]) @ R.T @ R).as_euler("XYZ")
     done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", 480, -60, 0, *over)
@@ -258,6 +261,7 @@ def test_touches_in_metres_are_refused_for_their_unit(wedge_lab):
     assert "check the part's unit of length (--unit), and that x y z are in mm" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_part_that_looks_the_same_turned_over_needs_a_start(lab):
     done = run("part.stl", "touched.csv", "-o", "pose.json", "--guess", "none")
     assert done.exit_code == 3
@@ -279,6 +283,7 @@ def test_few_points_are_refused_for_their_rival_with_the_place_to_touch(lab):
     assert "touch more points, one of them near" in done.stderr
 
 
+@pytest.mark.slow
 def test_an_error_above_the_limit_is_refused_and_of_pairs_told(wedge_lab):
     words = ["wedge.stl", "on.csv", "-o", "pose.json", "--initial", *NEAR]
     done = run(*words, "--max-error", 0.01)

@@ -315,6 +315,7 @@ def test_bad_input_is_one_clear_error(tmp_path, files):
     assert "still.parquet" in refused(still)
 
 
+@pytest.mark.slow
 def test_bad_input_touches_no_output(tmp_path, files):
     out = tmp_path / "out"
     assert dmpcli(files["demo"], "-o", out, "-q").exit_code == 0

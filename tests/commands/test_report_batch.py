@@ -130,6 +130,7 @@ def test_the_folder_holds_a_row_per_stroke_a_row_per_height_and_figures(tmp_path
     assert not [path.name for path in out.iterdir() if path.name.startswith(("batch", "strokes"))]
 
 
+@pytest.mark.slow
 def test_ids_are_cells_of_their_own(tmp_path):
     folder = put_batch(tmp_path / "a, b", [waves(HEIGHTS)])
     out = tmp_path / "out"

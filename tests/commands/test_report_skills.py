@@ -198,6 +198,7 @@ def test_a_batch_with_lifted_ends_has_the_figures_of_its_strokes(folder, lifting
     )
 
 
+@pytest.mark.slow
 def test_several_demonstrations_show_their_spread(folder, demo):
     others = [
         written(folder / f"wave-{h}.csv", wave(height=h, n=501 + 20 * i))

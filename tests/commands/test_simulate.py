@@ -21,6 +21,7 @@ def rpc_port(lab: Lab) -> int:
     return port
 
 
+@pytest.mark.slow
 def test_one_line_says_that_it_is_ready_with_urls_to_paste():
     with Lab() as lab:
         assert re.fullmatch(
@@ -36,6 +37,7 @@ def test_one_line_says_that_it_is_ready_with_urls_to_paste():
     assert lab.rest == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_it_serves_until_a_signal_ends_it(number, code):
     lab = Lab()
@@ -48,18 +50,21 @@ def test_it_serves_until_a_signal_ends_it(number, code):
     assert "Traceback" not in lab.told
 
 
+@pytest.mark.slow
 def test_a_long_look_ahead_is_warned_of():
     with Lab("-q", "--lookahead", "0.2") as lab:
         assert lab.line.startswith("ready ")
     assert "--lookahead 0.2: above 0.15 s the drag swings" in lab.told
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing():
     with Lab("-q") as lab:
         assert lab.line.startswith("ready ")
     assert lab.told == ""
 
 
+@pytest.mark.slow
 def test_the_arm_is_parked_at_the_start_of_the_stroke():
     with Lab("--start", "-600", "100", "-20", "--goal", "-650", "100", "-20") as lab:
         client = Client(rpc_port(lab))
@@ -69,6 +74,7 @@ def test_the_arm_is_parked_at_the_start_of_the_stroke():
     np.testing.assert_allclose(pose[:3], [-600.0, 100.0, -19.5], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_sensors_records_come_by_udp_and_its_pages_by_http():
     with Lab() as lab:
         address = parse(lab.sensor, "sensor")
@@ -86,6 +92,7 @@ def test_the_sensors_records_come_by_udp_and_its_pages_by_http():
     assert records[0][5] / 1e6 == pytest.approx(9.5, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_tool_of_ones_own_hangs_on_the_sensor(tmp_path):
     from dmpcli.instruments.mock import PEN
     from dmpcli.records import tool as tool_file
@@ -101,6 +108,7 @@ def test_a_tool_of_ones_own_hangs_on_the_sensor(tmp_path):
     assert record[5] / 1e6 == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_surface_of_ones_own_is_touched(tmp_path):
     plane = {"point": [0, 0, START[2] + 1.5], "normal": [0, 0, -1]}
     (tmp_path / "plane.json").write_text(json.dumps(plane))
@@ -114,6 +122,7 @@ def test_a_surface_of_ones_own_is_touched(tmp_path):
     assert record[5] / 1e6 == pytest.approx(9.5 - 5.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_fault_from_the_beginning_is_there():
     with Lab("--fault", "mode=teach", "--fault", "estop") as lab:
         client = Client(rpc_port(lab))
@@ -123,6 +132,7 @@ def test_a_fault_from_the_beginning_is_there():
         client.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -146,6 +156,7 @@ def test_a_mistake_on_the_command_line_is_one_message(options, words, tmp_path, 
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_start_out_of_reach_is_refused():
     done = run("simulate", *FREE_PORTS, "--start", "-2000", "0", "0", "--goal", "-2100", "0", "0")
     assert done.returncode == 3
@@ -161,6 +172,7 @@ def test_a_host_that_is_not_this_computers_is_refused():
         assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["robot", "monitor", "http", "tcp"])
 def test_a_port_that_is_taken_is_refused(name):
     with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -173,6 +185,7 @@ def test_a_port_that_is_taken_is_refused(name):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_sensor_port_that_is_taken_is_refused():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))

@@ -97,6 +97,7 @@ def test_enter_takes_points_and_each_is_there_at_once(tmp_path):
     assert person.said.endswith("points.csv: 2 points\n")
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_every_point(tmp_path):
     file = tmp_path / "pairs.csv"
     with Terminal("touch", "-o", file, "--pairs", cwd=tmp_path) as person:

@@ -23,6 +23,7 @@ def deviation(stroke, p):
     return cKDTree(stroke.at(np.linspace(0.0, 10.0, 20001), 10.0)).query(p)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_the_papers_stroke_is_drawn_at_its_wave_height(seed):
     stroke, recorder, ending = rehearse(seed=seed)
@@ -68,6 +69,7 @@ def test_the_built_in_drag_is_further_off_and_rougher_for_the_same_hand():
         assert "x_ref" not in theirs.log.columns()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["line", "circle"])
 def test_other_strokes_are_followed_too(shape):
     stroke, recorder, _ = rehearse(reference=shape, seed=1)

@@ -91,6 +91,7 @@ def test_a_readers_matplotlibrc_has_no_say_and_keeps_its_settings(strokes):
         assert mpl.rcParams["font.size"] == 30.0
 
 
+@pytest.mark.slow
 def test_a_demonstration_alone_is_drawn_too():
     assert set(gallery.gallery([taught()])) == {
         f"{name}.{kind}"

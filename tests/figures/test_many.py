@@ -151,6 +151,7 @@ def test_on_a_plane_that_is_given(tmp_path):
     assert np.isfinite(column(table, "surface_distance_max")).all()
 
 
+@pytest.mark.slow
 def test_on_a_mesh(tmp_path):
     mesh = Mesh(*fillet_mesh())
     made = []

@@ -84,6 +84,7 @@ def test_the_originals_failure_stands_beside_it(ground):
     assert lies["height_least"] == pytest.approx(off.min(), abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_demonstrations_own_height_is_taken_off(ground):
     lift = 0.2 * np.sin(np.linspace(0, np.pi, 501)) ** 2
     path, normal = fillet_wave(49.979)
@@ -109,11 +110,16 @@ def test_strokes_beside_the_mesh_say_why_they_have_no_wave_height(ground):
     V, F = ground.V, ground.F
     near = np.abs(V[F].mean(axis=1)[:, 1] + 40.0) < 15.0
     strip = Ground("strip.stl", Mesh(V, F[near]), V, F[near])
-    footing = placed([modified()], strip, None)[0].footing
+    whole = modified()
+    stroke = replace(
+        whole, position=whole.position[::8], raw=whole.raw[::8], t=whole.t[::8], rotation=None
+    )
+    footing = placed([stroke], strip, None)[0].footing
     assert footing.wave is None
     assert "leaves the mesh" in footing.remark
 
 
+@pytest.mark.slow
 def test_strokes_are_measured_together_as_each_alone(ground):
     many = [modified(30.0), original(), modified(49.98)]
     short = modified(49.98)
@@ -133,6 +139,7 @@ def said_of(stroke, ground):
     return " ".join(document.as_text(document.document([part], {"file": ground.label}), 80).split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flat", [True, False])
 def test_ends_planned_off_the_surface_are_remarked_on(ground, flat):
     if flat:
@@ -169,6 +176,7 @@ def test_figure_9_is_drawn_the_same_twice(strokes, ground):
     assert all(color in svg for color in ("#000000", "#e69f00", "#009e73"))
 
 
+@pytest.mark.slow
 def test_a_millimetre_is_as_long_along_x_as_along_z(strokes, ground):
     figure = surface_view(strokes[1:], ground, strokes[0])
     view = figure.axes[0]
@@ -177,6 +185,7 @@ def test_a_millimetre_is_as_long_along_x_as_along_z(strokes, ground):
     assert aspect / aspect[0] == pytest.approx(np.array(size) / size[0])
 
 
+@pytest.mark.slow
 def test_the_panel_shows_the_distance_over_time(strokes, ground):
     panel = surface_view(strokes[1:], ground, strokes[0]).axes[1]
     on, off = panel.lines
@@ -185,6 +194,7 @@ def test_the_panel_shows_the_distance_over_time(strokes, ground):
     assert np.ptp(off.get_ydata()) > 10.0
 
 
+@pytest.mark.slow
 def test_a_demonstration_far_away_is_left_out(strokes, ground):
     far = taught(wave() + np.array([0.0, 5000.0, 0.0]))
     names = [

@@ -134,6 +134,7 @@ def test_the_servo_says_of_its_robot_what_the_driver_declares(queues):
     assert info == ServoInfo("Brand", (0.002, 0.1), 0.1, queues)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("orientation", "angle", "length"), FORMS)
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=20)

@@ -80,6 +80,7 @@ def test_a_wrong_url_is_refused_with_what_would_do(url, role, words):
     assert f"--{role} {url}" in str(error.value)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30))
 def test_any_text_is_an_address_or_an_input_error(text):
     for url in (text, "mock:?" + text, "elite://" + text):

@@ -32,6 +32,7 @@ def test_fit_generalize_report_through_pipes(dmpcli, tmp_path):
     check_fit_generalize_report(lambda *a, **k: dmpcli(*a, **k).stdout, tmp_path, PIPED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes()[::2])
 def test_fit_generalize_report(in_process, tmp_path, shape):
     check_fit_generalize_report(lambda *a, **k: in_process(*a, **k).stdout_bytes, tmp_path, shape)

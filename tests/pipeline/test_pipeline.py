@@ -76,6 +76,7 @@ def test_the_same_seed_gives_the_same_bytes_through_every_stage(dmpcli, in_proce
     assert (tmp_path / "other.parquet").read_bytes() != (tmp_path / "a/demo.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_sample_runs_are_what_the_tool_makes(dmpcli, tmp_path):
     config = ROOT / "sample_runs" / "recorded.toml"
     dmpcli("record", "-o", "again.parquet", "--config", config, "--seed", "1")
@@ -185,6 +186,7 @@ def test_a_full_or_closed_standard_output_is_one_line_and_a_lost_reader_is_sigpi
     assert b"Exception" not in lost.stderr
 
 
+@pytest.mark.slow
 def test_a_closed_standard_input_is_one_line(tmp_path):
     done = shell("dmpcli fit - -o skill.json <&-", tmp_path)
     assert done.returncode == 2

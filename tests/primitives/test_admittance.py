@@ -130,6 +130,7 @@ def test_a_free_tool_turns_through_full_turns_without_a_singularity(axis):
     np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_the_turning_spring_brings_the_tool_home_from_any_side(seed):
     rng = np.random.default_rng(seed)

@@ -195,6 +195,7 @@ def test_each_demonstration_twice_changes_nothing(seed):
     assert {d.index % 3 for d in twice.doubts} == {d.index for d in found.doubts}
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.6, 1.7), st.floats(-0.9, 0.9)), min_size=2, max_size=4))
 @settings(max_examples=5, deadline=None)
 def test_time_laws_of_one_path_align_to_that_path(laws):

@@ -113,6 +113,7 @@ angles = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 shift = st.tuples(*[st.floats(-500.0, 500.0)] * 3).map(np.array)
 
 
+@pytest.mark.slow
 @given(angles, shift)
 def test_a_rigid_motion_of_pair_and_plane_moves_the_stroke_by_the_same_motion(skill, turn, by):
     Q = rotations.exp(turn)
@@ -166,6 +167,7 @@ def test_pairs_drawn_together_equal_pairs_drawn_alone(skill):
         np.testing.assert_allclose(stroke.euler, alone.euler, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("orientation", ["keep", "surface"])
 @pytest.mark.parametrize("asked", [False, True])
 @pytest.mark.parametrize("ground", ["parallel", "plane", "original", "no tool"])

@@ -24,6 +24,7 @@ def draw_at(skill, start, goal, duration=None):
     return draw(skill, pairs, seconds, None, Style(rate=100.0))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 @pytest.mark.parametrize(
     ("regression", "percent", "which"), [("lwr", 0.12, (0, 5)), ("ridge", 0.03, (1,))]
@@ -41,9 +42,10 @@ def test_reproduction_stays_within_the_promised_share_of_the_diagonal(
         assert np.linalg.norm(ends, axis=1).max() <= 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 def test_new_pairs_keep_the_shape(shape):
-    for stroke in (strokes(shape)[i] for i in (2, 6)):
+    for stroke in (strokes(shape)[i] for i in (2,)):
         skill = fit([stroke], Choices()).skill
         size = extent(stroke.position)
         angle, length = 1.2, skill.frame.length
@@ -84,10 +86,11 @@ def test_the_set_holds_what_the_promise_is_about():
     assert moving >= 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 def test_strokes_that_end_where_they_began_keep_their_shape_and_reach_their_goal(shape):
     """Each stroke and its way back: closed, and beyond its own ends."""
-    for stroke in (strokes(shape)[i] for i in (3, 4)):
+    for stroke in (strokes(shape)[i] for i in (3,)):
         back = stroke.position[-2::-1]
         there_and_back = Stroke(
             np.linspace(0.0, 2.0 * stroke.duration, 2 * len(stroke.t) - 1),

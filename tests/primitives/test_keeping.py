@@ -40,6 +40,7 @@ def wandering(seed, samples=301, duration=4.0):
 # Ends.
 
 
+@pytest.mark.slow
 @settings(max_examples=25, phases=[Phase.explicit, Phase.generate])
 @given(
     seed=st.integers(0, 10_000),
@@ -79,6 +80,7 @@ def velocities(result):
     return backward @ x / h, result.prepared[0].signal.velocity[-1, :3]
 
 
+@pytest.mark.slow
 @settings(max_examples=15, phases=[Phase.explicit, Phase.generate])
 @given(
     seed=st.integers(0, 10_000),
@@ -122,6 +124,7 @@ def from_table(table):
     return Stroke(table[:, 0], table[:, 1:4], rotation)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "lifted", "aslant"])
 @pytest.mark.parametrize("regression", ["lwr", "ridge"])
 def test_moving_a_recording_with_its_tool_moves_the_drawn_stroke(name, regression):
@@ -148,6 +151,7 @@ def test_mirroring_a_recording_mirrors_the_drawn_stroke(name):
     np.testing.assert_allclose(new.position, old.position @ MIRROR, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["timing", "shaken", "walls"])
 def test_the_order_of_demonstrations_changes_nothing(kind):
     if kind == "timing":

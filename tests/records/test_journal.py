@@ -146,6 +146,7 @@ def sound(tmp_path_factory):
     return written(tmp_path_factory.mktemp("sound") / "a.journal")
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(data=st.data())
 def test_damage_costs_rows_but_never_changes_one(sound, data):

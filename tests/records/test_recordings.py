@@ -183,6 +183,7 @@ def test_the_shortest_stroke_has_ten_samples():
 numbers = st.floats(-1e4, 1e4).map(lambda value: round(value, 6))
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(numbers, numbers, numbers), min_size=2, max_size=12), st.data())
 def test_decimal_commas_are_read_as_points_are(rows, data):
     separator = data.draw(st.sampled_from([";", "\t", " "]))

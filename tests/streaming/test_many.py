@@ -32,6 +32,7 @@ def test_of_a_thousand_that_are_left_a_few_are_named():
     assert len(said) < 160
 
 
+@pytest.mark.slow
 def test_of_a_thousand_that_fail_a_few_are_named():
     bad = Check("speed", 9.0, 1.0, "mm/s", 0.5, 7, "slow it down")
     judged = [Judged(plan(), [bad]) for _ in range(1000)]

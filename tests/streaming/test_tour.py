@@ -227,6 +227,7 @@ ENDS = st.lists(st.tuples(PLACE, PLACE, TURN, TURN), min_size=2, max_size=4)
 LEANS = st.tuples(st.floats(-40, 40), st.floats(-40, 40))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(ends=ENDS, leans=LEANS, factor=st.sampled_from([0.3, 1.0, 3.0]))
 def test_any_tour_is_continuous_keeps_every_limit_and_stays_clear_of_the_work(ends, leans, factor):

@@ -55,6 +55,7 @@ def test_on_convex_solids_it_finds_the_shortest_way():
     np.testing.assert_allclose(length[found], exact[found], rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["heat_sink", "funnel", "united", "half_round"])
 def test_what_was_traced_is_found_again_and_no_longer(name):
     judge = Judge(zoo.mesh(name))
@@ -87,6 +88,7 @@ def test_what_is_not_found_no_line_of_a_fine_fan_comes_near():
         assert np.linalg.norm(line - goal, axis=1).min() > 3.0
 
 
+@pytest.mark.slow
 def test_the_way_round_a_plate_is_as_long_as_on_paper():
     mesh = Mesh(*plate(0.8))
     top, under = np.array([[-40.0, 5.0, 0.0]]), np.array([[40.0, 5.0, -0.8]])

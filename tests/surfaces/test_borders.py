@@ -104,6 +104,7 @@ def plate(thickness):
     return V, F
 
 
+@pytest.mark.slow
 def test_the_far_side_of_a_thin_wall_is_not_drawn_on():
     mesh = Mesh(*plate(0.8))
     top, under = np.array([[-40.0, 5.0, 0.0]]), np.array([[40.0, 5.0, -0.8]])

@@ -19,6 +19,7 @@ def deviation(name, faces, headings=12, periods=2):
     return mesh, case, charts, lift, np.linalg.norm(lift.position - case.position, axis=-1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("periods", [1, 2])
 @pytest.mark.parametrize("name", cases.SURFACES)
 def test_strokes_follow_the_true_strip_as_well_as_the_mesh_allows(name, periods):
@@ -41,6 +42,7 @@ def test_deviation_shrinks_with_the_square_of_the_edge_length(name):
     assert fine < coarse / 5.5  # 9 for pure second order
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 def test_w_stands_off_the_mesh_along_the_normal(name):
     mesh, case = cases.mesh(name, 5_000), cases.case(name, 6, 100)
@@ -69,6 +71,7 @@ def test_a_rigid_motion_moves_everything_alike():
     np.testing.assert_allclose(again.axes, R @ lift.axes, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_order_of_vertices_faces_and_pairs_does_not_matter():
     mesh, case = cases.mesh("bumpy", 5_000), cases.case("bumpy", 16, 200)
     _, lift = cases.drawn(mesh, case)
@@ -115,6 +118,7 @@ def test_a_planar_mesh_is_the_plane():
     np.testing.assert_allclose(b.lift(around).position, a.lift(around).position, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [20.0, 30.0, 60.0, 90.0])
 @pytest.mark.parametrize("cells", [1, 12])
 def test_folds_are_drawn_as_on_the_flat_sheet(degrees, cells):
@@ -186,6 +190,7 @@ def over_the_fillet(radius):
     return start, start + 109.0 * u, coordinates, sheet
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [5.0, 20.0, 60.0])
 def test_fillets_of_long_slivers_stay_within_their_chordal_tolerance(radius):
     (V, F), rolled = fillet(radius)
@@ -229,6 +234,7 @@ def noisy(mesh, sigma):
     return Mesh(mesh.V + sigma * rng.normal(size=mesh.V.shape), mesh.F)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("sigma", [0.05, 0.1])
 def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma):

@@ -65,6 +65,7 @@ def test_what_an_exact_chart_drew_is_found_again(name, height):
     assert_found(charts, swung(charts, 20.0, height))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["saddle", "bumpy"])
 @pytest.mark.parametrize("height", [0.0, 0.3, HEIGHT, -HEIGHT])
 def test_what_a_mesh_s_chart_drew_is_found_again(meshes, name, height):
@@ -125,6 +126,7 @@ def test_a_sphere_is_reached_nearly_to_the_pole_and_around():
     assert_found(charts, swung(charts, wide=150.0 * np.radians(80.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cylinder", "bumpy"])
 def test_a_stroke_does_not_depend_on_those_beside_it(meshes, name):
     charts = laid(EXACT.get(name) or meshes[name], 3)
@@ -169,6 +171,7 @@ def test_beyond_the_centre_of_curvature_feet_are_not_told_apart():
     assert not invert(charts, axis[None]).reached.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["saddle", "bumpy"])
 def test_feet_are_those_of_the_true_surface_up_to_the_mesh(name):
     """The oracle walks geodesics of the field by Runge and Kutta, and knows no mesh."""

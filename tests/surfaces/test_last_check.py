@@ -132,6 +132,7 @@ def test_waves_round_the_corner_of_a_box_are_whole_or_refused():
     assert (move <= 3.0 * flat + 0.3).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "reach"), [("angle_block", 25.0), ("carriage", 18.0)])
 def test_strokes_anywhere_on_machined_parts_are_drawn_right_or_refused(name, reach):
     mesh, rng = part(name), np.random.default_rng(0)

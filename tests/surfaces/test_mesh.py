@@ -121,6 +121,7 @@ def test_walks_and_connections_follow_the_true_geodesics():
     np.testing.assert_allclose(again.position, mesh.closest(goal).position, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [60.0, 90.0])
 def test_walks_cross_folds_as_on_the_flat_sheet(degrees):
     mesh = folded(degrees)

@@ -56,6 +56,7 @@ def test_standing_still_is_no_harm():
     assert np.isfinite(orientation.smoothed(axes, position)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_frames_of_meshes_turn_little_more_than_those_of_the_true_surface(name, noise):

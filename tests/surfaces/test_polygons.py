@@ -118,6 +118,7 @@ outlines = st.integers(3, 40).flatmap(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(outlines, st.tuples(*[st.floats(-3.0, 3.0)] * 3))
 def test_the_area_of_any_outline_is_kept_whatever_its_first_corner(shape, turn):

@@ -79,6 +79,7 @@ def test_too_few_pairs_one_point_and_a_wrong_unit_are_refused():
         from_pairs(part / 1000.0, part)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(SEEDS, st.sampled_from(["box", "bumpy"]))
 def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
@@ -92,6 +93,7 @@ def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
     assert found.residual.max() < 1e-6
 
 
+@pytest.mark.slow
 def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
@@ -141,6 +143,7 @@ def ball():
     return np.array(made.vertices, dtype=float), np.array(made.faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mesh", "free"),
     [
@@ -190,6 +193,7 @@ def test_six_touched_points_are_too_few():
         laid(V[:6], V, F, np.eye(3), np.zeros(3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count", "least"),
     [("wedge", 8, 0.0), ("bracket", 12, 0.2), ("wedge", 20, 0.75), ("bracket", 30, 0.85)],
@@ -204,6 +208,7 @@ def test_accepted_poses_are_right_and_within_their_bound(name, count, least):
     assert len(good) >= least * len(found)
 
 
+@pytest.mark.slow
 def test_in_all_orientations_the_pose_is_found_without_a_start():
     V, F, part = loaded("bracket")
     found = [trial(V, F, part, 24, seed, anywhere=True) for seed in range(2)]
@@ -211,6 +216,7 @@ def test_in_all_orientations_the_pose_is_found_without_a_start():
     assert max(one.error for one in found) < 1.0
 
 
+@pytest.mark.slow
 def test_a_box_in_all_orientations_has_a_rival_that_looks_the_same():
     rng = np.random.default_rng(11)
     V, F = box((100.0, 60.0, 40.0))

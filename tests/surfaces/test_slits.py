@@ -29,6 +29,7 @@ def straight(mesh, start, goal, side):
     return charts.lift(coordinates)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -0.9, 1.3)])
 @pytest.mark.parametrize(("first", "last"), [(2, 3), (2, 6), (0, 4)])
 def test_only_strokes_that_cross_the_foot_of_a_wall_are_refused(first, last, turn):

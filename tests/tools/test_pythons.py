@@ -97,6 +97,7 @@ def test_version_managers_folders_are_looked_at(pythons, fake, tmp_path, monkeyp
     ]
 
 
+@pytest.mark.slow
 def test_it_finds_the_python_that_runs_it():
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     command = [sys.executable, TOOLS / "pythons.py"]

@@ -68,6 +68,7 @@ def place(tmp_path):
     return Place(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_python_that_is_not_there_or_does_not_run_is_one_line(place):
     place.python = "python3.99"
     assert "python3.99 does not run: name CPython 3.11 or newer" in place.refused()
@@ -75,6 +76,7 @@ def test_a_python_that_is_not_there_or_does_not_run_is_one_line(place):
     assert "does not run" in place.refused()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", ["CPython 3.9.2", "PyPy 3.11.13"])
 def test_a_python_too_old_or_of_another_make_is_one_line(place, told):
     place.script(f"echo {told}; exit 3")

@@ -121,6 +121,7 @@ def test_a_closed_connection_is_told_at_once(robot):
     monitor.close()
 
 
+@pytest.mark.slow
 def test_what_sends_no_frames_is_no_monitor(robot):
     robot.monitor["word"] = 7
     with pytest.raises(InstrumentError, match=r"sends no state \(silent; a frame ends in 0x000000"):

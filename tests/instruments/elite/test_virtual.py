@@ -80,6 +80,7 @@ def stands(state):
     return at
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
 @pytest.mark.parametrize("newline", ["yes", "no"])
 def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
@@ -97,6 +98,7 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     assert set(columns["state"]) == {"ready"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
 @pytest.mark.parametrize(
     ("fault", "words", "error"),
@@ -116,6 +118,7 @@ def test_what_happens_on_the_way_stops_it_with_its_reason(bench, kind, mode, fau
     assert len(loop.log) < 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
 def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
     made = bench("drop=robot@0.4", mode=mode)
@@ -126,6 +129,7 @@ def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
     assert np.linalg.norm(stands(made.servo.state) - way[-1]) > 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
 def test_a_signal_ends_it_and_the_arm_stands(bench, kind, mode):
     made = bench(mode=mode)
@@ -158,6 +162,7 @@ def test_a_tool_that_the_controller_does_not_know_is_refused(bench):
     bench(tool=None, check=0).servo.open()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("habit", ["alarm", "hold", "decelerate"])
 def test_an_arm_that_gets_no_more_set_points_stands_or_says_so(bench, habit):
     made = bench(f"underrun={habit}")

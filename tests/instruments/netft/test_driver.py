@@ -410,6 +410,7 @@ def test_a_name_without_an_address_is_one_line():
     assert "no-such-sensor.invalid has no address" in message
 
 
+@pytest.mark.slow
 def test_a_host_that_takes_a_connection_and_says_nothing_is_given_up():
     with socket.create_server(("127.0.0.1", 0)) as mute:
         port = str(mute.getsockname()[1])

@@ -53,6 +53,7 @@ def test_what_is_not_to_be_answered_is_not():
     assert answer(b'{"method":"silent","id":1}', echo, newline=True) == b""
 
 
+@pytest.mark.slow
 @given(
     st.one_of(
         st.binary(),
