@@ -277,13 +277,12 @@ def mesh_charts(
     a, b = mesh.closest(start), mesh.closest(goal)
     part = mesh.components[a.face]
     apart = np.where(part != mesh.components[b.face], Status.OTHER_COMPONENT, Status.DRAWN)
-    # A solid is drawn on from outside: if the tool would stand in it, a thin wall's far side was
-    # nearest. An open sheet may be wound either way.
+    # A solid is drawn on from outside. An open sheet may be wound either way.
     outward = mesh.outward[part][:, None]
     sign = np.where(outward == 0.0, towards(a.normal, side), outward)
     if side is not None:
         inside = (outward != 0.0) & (dot(sign * a.normal, np.asarray(side, dtype=float)) < 0.0)
-        apart = first_refusal(apart, np.where(inside[:, 0], Status.OTHER_SIDE, Status.DRAWN))
+        apart = first_refusal(apart, np.where(inside[:, 0], Status.FACES_AWAY, Status.DRAWN))
     count = len(part)
     normal = sign * a.normal
     centre = Centre(a.position, normal, normal, np.ones((count, 1)), sign, part)

@@ -31,6 +31,7 @@ class Status(IntEnum):
     MISSED = 10
     TILTED = 11
     OPPOSITE = 12
+    FACES_AWAY = 13
     NEAR_BORDER = 20
     KEPT_OUT = 21
 
@@ -60,6 +61,10 @@ _WORDS = {
     Status.OTHER_SIDE: (
         "start, goal or the stroke between is nearest to the other side of a thin wall",
         "move start and goal towards the tool, and keep the stroke off the wall's rim",
+    ),
+    Status.FACES_AWAY: (
+        "the surface at the start faces away from the tool, which would stand inside the part",
+        "turn the tool there with --start X Y Z RX RY RZ, or begin where the part faces it",
     ),
     Status.NO_GEODESIC: (
         "no geodesic leads from start to goal, in any heading: a corner, hole or gap is between",

@@ -124,10 +124,10 @@ def test_a_solid_is_drawn_on_from_outside_however_it_is_wound(wound):
     goal = start * [-1, 1, 1]
     down = np.array([0.0, 0.0, -1.0])
     np.testing.assert_array_equal(
-        mesh.charts(start, goal, -down).status, [Status.DRAWN, Status.OTHER_SIDE]
+        mesh.charts(start, goal, -down).status, [Status.DRAWN, Status.FACES_AWAY]
     )
     np.testing.assert_array_equal(
-        mesh.charts(start, goal, down).status, [Status.OTHER_SIDE, Status.DRAWN]
+        mesh.charts(start, goal, down).status, [Status.FACES_AWAY, Status.DRAWN]
     )
     lift = mesh.charts(start, goal).lift(fields.strokes([80.0, 80.0], 50))
     assert not lift.status.any()
