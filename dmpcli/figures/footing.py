@@ -243,6 +243,8 @@ class _Place:
     remark: str | None
 
 
+_OF_THE_STRIP = (Status.FOLDED, Status.LOST, Status.TORN, Status.MISSED, Status.TILTED)
+
 _CLOSED = _Place(None, None, "closed, so there is no line to measure waves from")
 
 
@@ -265,5 +267,15 @@ def _places(surface: Surface, ends: Floats, at: Sequence[Floats], normal: Floats
         if found.reached[i, :count].all():
             places.append(_Place(length, found.coordinates[i, :count, :2], None))
             continue
-        places.append(_Place(length, None, Status(found.status[i]).reason))
+        places.append(_Place(length, None, _why(Status(found.status[i]))))
     return places
+
+
+def _why(status: Status) -> str:
+    """Say why places were not found; what was drawn facet by facet need not lie in one strip."""
+    if status not in _OF_THE_STRIP:
+        return status.reason
+    return (
+        f"it is read in the smooth strip chart, and there {status.reason}; a stroke that was drawn "
+        "facet by facet may be right all the same"
+    )
