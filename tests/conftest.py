@@ -1,7 +1,6 @@
 """Settings of all tests."""
 
 import functools
-import os
 
 import typer.testing
 from hypothesis import settings
@@ -12,8 +11,3 @@ settings.load_profile("dmpcli")
 
 # Typer's runner builds all commands anew for each call, which takes longer than most calls do.
 typer.testing._get_command = functools.cache(typer.testing._get_command)
-
-
-def pytest_xdist_auto_num_workers():
-    """One process more than cores: some tests wait for a wire, a clock or another process."""
-    return (os.cpu_count() or 1) + 1

@@ -139,6 +139,8 @@ def test_threads_that_all_ask_the_lab_see_one_arm(serve):
         reached = client.call("get_joint_pos")
         if np.abs(reached - here - 1.0).max() < 1e-3:
             break
+        # On a busy machine the buffer may have run empty: the last points wait for more.
+        assert client.call("tt_put_servo_joint_to_buf", {"targetPos": list(here + 1.0)})
         time.sleep(0.01)
     np.testing.assert_allclose(reached, here + 1.0, atol=1e-3)
     client.close()
