@@ -442,6 +442,8 @@ def _split(draft: _Draft, fan: Integers) -> tuple[_Draft, Integers]:
     used, keeps = np.unique(owner, return_index=True)
     number[keeps] = used
     added = np.flatnonzero(number < 0)
+    if len(added) == 0:
+        return draft, added  # whose edges are known already
     number[added] = len(V) + np.arange(len(added))
     V = np.concatenate([V, V[owner[added]]])
     return _Draft(V, number[fan].reshape(3, m).T.copy(), draft.forks), owner[added]
