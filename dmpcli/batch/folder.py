@@ -94,6 +94,7 @@ class Folder:
             footer.num_rows,
             file.stat().st_size,
             pieces={int(row): ends for row, ends in fact.get("pieces", {}).items()},
+            slow=fact.get("slow", 0),
         )
 
     def leave(self) -> None:

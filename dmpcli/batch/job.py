@@ -18,6 +18,7 @@ from dmpcli.primitives.drawing import Block, Stroke, Style, draw_blocks
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.reach import Reach
 from dmpcli.primitives.skill import Skill
+from dmpcli.primitives.tool_speed import LEAST_HELD, held
 from dmpcli.records import record, trajectory
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Form, Provenance, Record
@@ -122,6 +123,8 @@ class Outcome:
         Of a stroke that is split: of each piece start, goal and seconds, by the row.
     unfolded : int
         How many strokes cross a sharp crease.
+    slow : int
+        How many strokes hold the speed that was asked for on less than `LEAST_HELD` of the path.
     rows, size : int
         Rows and bytes of the part's file; 0 where there is none.
     fatal : bool
@@ -136,6 +139,7 @@ class Outcome:
     size: int = 0
     fatal: bool = False
     pieces: dict[int, list[PieceEnds]] = field(default_factory=dict)
+    slow: int = 0
 
     def fact(self) -> dict[str, Any]:
         """Return what the part's own metadata remember of it."""
@@ -147,6 +151,8 @@ class Outcome:
         }
         if self.pieces:
             found["pieces"] = {str(row): ends for row, ends in self.pieces.items()}
+        if self.slow:
+            found["slow"] = self.slow
         return found
 
 
@@ -252,7 +258,7 @@ def _outcome(job: Job, part: Part, drawn: list[Stroke], settled: list[Settled]) 
     clipped: dict[int, float] = {}
     pieces: dict[int, list[PieceEnds]] = {}
     style = job.task.style
-    unfolded, fatal = 0, False
+    unfolded, slow, fatal = 0, 0, False
     for row, before, one in zip(part.rows.tolist(), drawn, settled, strict=True):
         if one.status != OK:
             failed[row] = one.status
@@ -264,7 +270,15 @@ def _outcome(job: Job, part: Part, drawn: list[Stroke], settled: list[Settled]) 
         elif style.pace is not None or len(one.strokes[0].position) < len(before.position):
             clipped[row] = float(one.strokes[0].timing.t[-1])
         unfolded += 1 if one.strokes[0].unfolded else 0
-    return Outcome(part.number, failed, clipped, unfolded, fatal=fatal, pieces=pieces)
+        slow += any(is_slow(stroke, style) for stroke in one.strokes)
+    return Outcome(part.number, failed, clipped, unfolded, fatal=fatal, pieces=pieces, slow=slow)
+
+
+def is_slow(stroke: Stroke, style: Style) -> bool:
+    """Tell whether a stroke holds the speed that was asked for on less than `LEAST_HELD` of it."""
+    if style.pace is None:
+        return False
+    return held(stroke.position, style.rate, style.pace.speed)[0] < LEAST_HELD
 
 
 def _ends(piece: Stroke) -> PieceEnds:

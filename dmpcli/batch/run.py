@@ -55,6 +55,8 @@ class Summary:
         Parts that an earlier run had drawn.
     split : int
         Pairs whose stroke was split.
+    slow : int
+        Strokes that do not hold the speed that was asked for.
     parts : int
     """
 
@@ -63,6 +65,7 @@ class Summary:
     unfolded: int = 0
     kept: int = 0
     split: int = 0
+    slow: int = 0
     parts: int = 0
 
 
@@ -165,6 +168,7 @@ class Batch:
         summary.failed += len(outcome.failed)
         summary.unfolded += outcome.unfolded
         summary.split += len(outcome.pieces)
+        summary.slow += outcome.slow
 
     def _table(self) -> Record:
         """Return the table of pairs with what became of each; one row for each piece of a split."""

@@ -184,7 +184,7 @@ def _tell(
     table: "PairTable", output: Path, shard: "Shard", summary: "Summary", quiet: bool
 ) -> None:
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.commands.process_options import SPLIT
+    from dmpcli.commands.process_options import SLOW, SPLIT
     from dmpcli.records import streams
     from dmpcli.records.pairs import OK
 
@@ -193,6 +193,8 @@ def _tell(
             f"{counted(summary.unfolded, 'stroke')} across a sharp crease, where no tool can "
             "follow the surface"
         )
+    if summary.slow:
+        warn(f"{output}: {counted(summary.slow, 'stroke')} {SLOW}")
     if summary.split:
         tell(f"{output}: {counted(summary.split, 'stroke')} {SPLIT}", quiet)
     if summary.kept:

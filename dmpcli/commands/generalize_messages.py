@@ -88,7 +88,7 @@ def tell_of_surface(
 ) -> None:
     """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over."""
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.primitives.drawing import turned_over
+    from dmpcli.primitives.sides import turned_over
 
     pairs = table.pairs[table.good.nonzero()[0]]
     start = pairs.start
@@ -127,7 +127,7 @@ def _tell_of_guessed_side(
     import numpy as np
 
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.primitives.drawing import normals_at
+    from dmpcli.primitives.sides import normals_at
 
     if not len(start):
         return
@@ -156,7 +156,7 @@ def _tell_of_taught_side(
     import numpy as np
 
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.primitives.drawing import taught_side
+    from dmpcli.primitives.sides import taught_side
     from dmpcli.surfaces.plane import Plane
 
     side = None if isinstance(given, Plane) else taught_side(skill, given, start)

@@ -50,6 +50,8 @@ ToolAcceleration = Annotated[
     typer.Option(metavar="MM_S2", help="At the ends and in corners at most (1000)."),
 ]
 
+_REST = "bends and ends ask for less: lower --tool-speed, or raise --tool-acceleration"
+SLOW = f"hold --tool-speed on less than half of their paths; {_REST}"
 SPLIT = "split at the border; pieces shorter than 5 mm are left out"
 
 _OFF = 1.0
@@ -285,6 +287,22 @@ def _regions(
             raise InputError(f"{name} {error}") from None
     tell(f"{source.name}: no stroke enters {counted(len(found), 'region')}", quiet)
     return tuple(found)
+
+
+def warn_of_speed(strokes: "Sequence[Stroke]", ids: "Sequence[str]", style: "Style") -> None:
+    """Warn of strokes that hold the speed that was asked for on a small part of their path only."""
+    from dmpcli.batch.job import is_slow
+    from dmpcli.commands.messages import warn
+    from dmpcli.primitives.tool_speed import held
+
+    for name, stroke in zip(ids, strokes, strict=True):
+        if style.pace is not None and is_slow(stroke, style):
+            share, fastest = held(stroke.position, style.rate, style.pace.speed)
+            which = f"stroke {name}" if len(ids) > 1 else "the stroke"
+            warn(
+                f"{which} goes {style.pace.speed:g} mm/s on {100.0 * share:.0f} % of its path, "
+                f"{fastest:.1f} at most; {_REST}"
+            )
 
 
 def tell_of_pieces(

@@ -32,7 +32,7 @@ def write(
 
     from dmpcli.batch.job import settle
     from dmpcli.commands.messages import about, tell, warn
-    from dmpcli.commands.process_options import tell_of_pieces
+    from dmpcli.commands.process_options import tell_of_pieces, warn_of_speed
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.contact_heights import end_heights
     from dmpcli.primitives.copies import ends as own_ends
@@ -79,6 +79,7 @@ def write(
         )
     if any(stroke.unfolded for stroke in strokes):
         warn("the stroke crosses a sharp crease, where no tool can follow the surface")
+    warn_of_speed(strokes, ids, task.style)
     said = f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
     split = any(stroke.cuts for stroke in drawn)
     if len(strokes) > 1 or split:

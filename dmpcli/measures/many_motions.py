@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.measures.low_pass import zero_phase
 from dmpcli.measures.smoothness import CUTOFF, ORDER
+from dmpcli.sine_series import zero_phase
 
 _THRESHOLD, _PADDING = 0.05, 4
 _FEW = 0.3

@@ -13,7 +13,7 @@ References
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.measures.low_pass import zero_phase
+from dmpcli.sine_series import zero_phase
 
 CUTOFF = 10.0
 """Hz: above it a hand's movement holds noise only [3]; the same for files of every rate."""

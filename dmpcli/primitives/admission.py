@@ -6,8 +6,9 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.primitives.contact_heights import demonstrated_scale
-from dmpcli.primitives.drawing import Style, turned_over
+from dmpcli.primitives.drawing import Style
 from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.sides import turned_over
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.plane import Plane, extent
 from dmpcli.surfaces.protocol import Surface

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.sine_series import SineSeries
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -67,9 +68,7 @@ class Curve:
 
         Weights of N functions cannot hold more than N pieces; what is left would alias into them.
         The gentle slope of a Butterworth filter of order 4, forward and backward, harms the
-        regression less than the sharp one of a spline. It acts on the sine series of what the
-        line from start to goal leaves: the stroke goes on beyond its ends point-mirrored, and keeps
-        them.
+        regression less than the sharp one of a spline.
 
         Parameters
         ----------
@@ -85,27 +84,16 @@ class Curve:
         if intervals >= self.intervals:
             t = np.linspace(0.0, self.duration, samples)
             return self(t), self(t, 1), self(t, 2)
-        from scipy.fft import dct, dst, next_fast_len
+        from scipy.fft import next_fast_len
 
         pieces = next_fast_len(min(MOST_SAMPLES, _OVERSAMPLED * self.intervals), real=True)
-        x = self.even(pieces + 1)
-        start, way = x[0], x[-1] - x[0]
-        inside = np.linspace(0.0, 1.0, pieces + 1)[1:-1, None]
-        order = min(pieces, samples - 1) - 1
-        series = dst(x[1:-1] - start - inside * way, type=1, axis=0)[:order] / pieces
-        n = np.arange(1, order + 1)[:, None]
-        series /= 1.0 + (n / intervals) ** (2 * _ORDER)
-        frequency = np.pi * n / self.duration
-        share = np.linspace(0.0, 1.0, samples)[:, None]
-        sine, cosine = np.zeros((2, samples, x.shape[1]))
-        sine[1:-1][:order] = series
-        cosine[1:-1][:order] = frequency * series
-        values, velocity, bend = start + share * way, np.zeros_like(sine), np.zeros_like(sine)
-        values[1:-1] += 0.5 * dst(sine[1:-1], type=1, axis=0)
-        velocity = way / self.duration + 0.5 * dct(cosine, type=1, axis=0)
-        sine[1:-1][:order] *= frequency**2
-        bend[1:-1] = -0.5 * dst(sine[1:-1], type=1, axis=0)
-        return values, velocity, bend
+        series = SineSeries.of(np.ascontiguousarray(self.even(pieces + 1).T))
+        n = np.arange(1, pieces)
+        series = series.lowered(1.0 / (1.0 + (n / intervals) ** (2 * _ORDER)))
+        x, velocity, acceleration = (
+            series.at(samples, order).T / self.duration**order for order in range(3)
+        )
+        return x, velocity, acceleration
 
 
 def dense_count(samples: int) -> int:

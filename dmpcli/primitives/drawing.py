@@ -20,17 +20,14 @@ from dmpcli.primitives.generalization import (
 )
 from dmpcli.primitives.inclination import Inclination
 from dmpcli.primitives.retiming import Timing, timing
+from dmpcli.primitives.sides import taught_side, turned_over
 from dmpcli.primitives.skill import Skill
 from dmpcli.primitives.tool_speed import Pace
 from dmpcli.surfaces.keep_off import KeepOff
 from dmpcli.surfaces.plane import Plane, pair_charts
-from dmpcli.surfaces.protocol import Charts, Status, Surface, towards
+from dmpcli.surfaces.protocol import Charts, Status, Surface
 
 OnBorder = Literal["fail", "clip", "skip", "split"]
-
-# A surface that passes so near the taught start, mm, with its normal but for so small an angle
-# (cosine), is the one that the skill was taught on.
-_SAME_PLACE, _SAME_NORMAL = 0.05, 0.99
 
 
 @dataclass(frozen=True)
@@ -295,19 +292,6 @@ def _redraw(
     return redraw
 
 
-def turned_over(skill: Skill, pairs: Pairs, surface: Surface | None) -> Booleans:
-    """Tell at which pairs a surface is on the other side than was guessed for the skill.
-
-    Returns
-    -------
-    array of bool, shape (B,)
-        All false where the skill knows its side, or no surface is named.
-    """
-    if not skill.side_guessed or surface is None:
-        return np.zeros(len(pairs), dtype=bool)
-    return np.asarray(normals_at(surface, pairs.start) @ skill.frame.normal < 0.0)
-
-
 def seen_from(
     skill: Skill, style: Style, pairs: Pairs, surface: Surface | None
 ) -> tuple[Skill, ContactHeights | None]:
@@ -316,14 +300,6 @@ def seen_from(
     if len(over) and over.all():
         return skill.turned_over(), style.heights_over
     return skill, style.heights
-
-
-def normals_at(surface: Surface, start: Floats) -> Floats:
-    """Normals at starts (B, 3) on the side that a skill without orientation is drawn on."""
-    if isinstance(surface, Plane):
-        return np.broadcast_to(surface.normal, start.shape)
-    normal = surface.closest(start).normal
-    return normal * towards(normal, None)
 
 
 def _drawn(
@@ -409,25 +385,6 @@ def charts_of(skill: Skill, pairs: Pairs, surface: Surface | None, turn: float =
     else:
         side = taught_side(skill, surface, pairs.start)
     return surface.charts(pairs.start, pairs.goal, side, closed)
-
-
-def taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None:
-    """Vectors to the side that a skill was taught on, at starts (B, 3) or everywhere (3,).
-
-    The way its tool pointed, or without orientation the normal where it was taught; but on the very
-    surface that it was taught on, that surface's side: about a cylinder, or on the other face of a
-    part, the tool's direction at the taught start may point out of the material. None where the
-    skill does not know its side.
-    """
-    if skill.surface is not None:
-        taught = surface.closest(skill.frame.start[None])
-        along = float(taught.normal[0] @ skill.frame.normal)
-        if taught.distance[0] < _SAME_PLACE and abs(along) > _SAME_NORMAL:
-            return np.asarray(np.sign(along) * surface.closest(start).normal)
-    R = skill.frame.rotation
-    if R is not None:
-        return -R[:, 2]
-    return None if skill.surface is None else skill.frame.normal
 
 
 def _about_normal(turn: float) -> Floats:

@@ -19,6 +19,12 @@ from dmpcli.primitives.arc_length import monotone
 ACCELERATION = 1000.0
 """Default of the largest acceleration, mm/s²: less than half of what `execute` lets an arm have."""
 
+HELD = 0.05
+"""Part of a speed that it may be missed by, where it counts as held."""
+
+LEAST_HELD = 0.5
+"""Part of the path on which a speed that was asked for is expected to be held."""
+
 # The acceleration rises and falls within this time, s: three servo periods of 50 Hz either way.
 _BLENDED = 0.12
 # Both accelerations at once come to the limit.
@@ -75,6 +81,21 @@ def passed(stroke: Floats, position: Floats, pace: Pace, rate: float) -> Floats:
     passes = np.maximum.accumulate(stroke[0] + law.time(at))
     passes[0], passes[-1] = stroke[0], stroke[-1]
     return np.asarray(np.minimum(passes, stroke[-1]))
+
+
+def held(position: Floats, rate: float, speed: float) -> tuple[float, float]:
+    """How well a speed is held by samples (T, 3) at so many Hz.
+
+    Returns
+    -------
+    share : float
+        Part of the path that is passed at the speed, within `HELD`.
+    fastest : float
+        mm/s.
+    """
+    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    fast = steps * rate >= (1.0 - HELD) * speed
+    return float(steps[fast].sum() / max(steps.sum(), _SLOWEST)), float(steps.max(initial=0) * rate)
 
 
 def _law(arc: Floats, position: Floats, pace: Pace) -> tuple[Floats, Floats]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces.conditioning import radius_of
 
 Closest = Callable[[Floats], tuple[Floats, Floats]]
 """From points (n, 3) to the closest points of the part and its unit normals there, part frame."""
@@ -124,7 +125,7 @@ def anywhere(centre: Floats, about: Floats, count: int) -> Poses:
     r, big = np.sqrt(s / count), np.sqrt(1.0 - s / count)
     alpha, beta = 2.0 * np.pi * s / np.sqrt(2.0), 2.0 * np.pi * s / _PSI
     q = np.stack([r * np.sin(alpha), r * np.cos(alpha), big * np.sin(beta), big * np.cos(beta)], 1)
-    R = _matrices(q)
+    R = rotations.from_quaternion(q)
     return Poses(R, about - R @ centre)
 
 
@@ -199,7 +200,7 @@ def descended(
     """
     R, t = np.array(starts.rotation, dtype=float), np.array(starts.position, dtype=float)
     centre = touched.mean(axis=0)
-    radius = float(np.sqrt(np.mean(np.sum((touched - centre) ** 2, axis=1))))
+    radius = radius_of(touched - centre)
     distance, gradient = signed(Poses(R, t).to_part(touched), closest)
     squares = np.sum(distance**2, axis=1)
     damping = np.full(len(R), 1e-3)
@@ -246,9 +247,3 @@ def _ball(cube: Floats) -> Floats:
     flat = np.sqrt(1.0 - z**2)
     direction = np.stack([flat * np.cos(around), flat * np.sin(around), z], axis=1)
     return np.asarray(np.cbrt(cube[:, 2:]) * direction)
-
-
-def _matrices(q: Floats) -> Floats:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(q).as_matrix())

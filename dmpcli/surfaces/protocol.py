@@ -67,7 +67,7 @@ _WORDS = {
         "turn the tool there with --start X Y Z RX RY RZ, or begin where the part faces it",
     ),
     Status.NO_GEODESIC: (
-        "no geodesic leads from start to goal, in any heading: a corner, hole or gap is between",
+        "no geodesic from start to goal was found in any heading: a corner, hole or gap is between",
         "move start or goal so that the way is clear",
     ),
     Status.BORDER: (

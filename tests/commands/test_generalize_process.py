@@ -196,6 +196,23 @@ def test_the_tool_s_speed_is_held_and_the_path_is_the_same(shop, tmp_path, surfa
     assert executes(out).exit_code == 0
 
 
+def test_a_speed_that_bends_and_ends_do_not_allow_is_told(shop, tmp_path):
+    for speed, told in ((30, False), (400, True)):
+        out = tmp_path / f"{speed}.parquet"
+        done = run(shop / "s.json", "-o", out, *PAIR, "--tool-speed", speed, "-q")
+        assert done.exit_code == 0, done.stderr
+        assert ("goes 400 mm/s on 0 % of its path" in done.stderr) == told
+        assert ("--tool-acceleration" in done.stderr) == told
+        x = strokes(out)[0]["1"][1]
+        fastest = 50.0 * np.linalg.norm(np.diff(x, axis=0), axis=1).max()
+        assert f"{fastest:.1f} at most" in done.stderr or not told
+    options = ["--pairs", shop / "pairs.csv", "--tool-speed", 400, "--on-error", "skip"]
+    for _ in range(2):  # drawn, and kept from before
+        done = run(shop / "s.json", "-o", tmp_path / "batch", *options)
+        assert done.exit_code == 0, done.stderr
+        assert "hold --tool-speed on less than half of their paths" in done.stderr
+
+
 @pytest.mark.parametrize("surface", ["plane.json", "cylinder.json", "sphere.json", "plate.ply"])
 def test_lead_and_tilt_are_those_against_the_normals_of_the_file(shop, tmp_path, surface):
     y = -38.0

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmpcli.primitives.tool_speed import Pace, passed
+from dmpcli.primitives.tool_speed import Pace, held, passed
 
 RATE = 50.0
 T = np.linspace(0.0, 10.0, 2001)
@@ -88,3 +88,13 @@ def test_a_right_angle_is_passed_slowly_and_the_speed_is_back_after_it():
 
 def test_a_point_is_passed_in_one_step():
     assert passed(T, np.zeros((len(T), 3)), Pace(10.0), RATE).tolist() == [0.0, 10.0]
+
+
+def test_what_is_held_is_the_share_of_the_path_at_the_speed():
+    """1 s at 40 mm/s and 3 s at 20 mm/s: four tenths of the path."""
+    x = np.concatenate([np.linspace(0.0, 40.0, 51), np.linspace(40.0, 100.0, 151)[1:]])
+    position = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
+    for speed, share in ((40.0, 0.4), (41.0, 0.4), (20.0, 1.0), (43.0, 0.0)):
+        found, fastest = held(position, 50.0, speed)
+        assert found == pytest.approx(share)
+        assert fastest == pytest.approx(40.0)

@@ -1,10 +1,10 @@
-"""The low-pass of the smoothness measures, against scipy's filter and its frequency response."""
+"""The low-pass against scipy's filter and its frequency response, derivatives in closed form."""
 
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt, sosfreqz
 
-from dmpcli.measures.low_pass import zero_phase
+from dmpcli.sine_series import SineSeries, zero_phase
 
 
 @pytest.mark.parametrize("order", [2, 6])
@@ -37,3 +37,13 @@ def test_lines_and_ends_stay_and_the_order_of_axes_does_not_matter():
     line = np.linspace(-3.0, 8.0, 77)
     np.testing.assert_allclose(zero_phase(line, 0.01, 6), line, atol=1e-12)
     np.testing.assert_array_equal(zero_phase(np.array([1.0, 5.0]), 0.1, 6), [1.0, 5.0])
+
+
+@pytest.mark.parametrize("samples", [300, 501, 1200])
+def test_values_and_derivatives_are_those_of_the_sines(samples):
+    s, at = np.linspace(0.0, 1.0, 501), np.linspace(0.0, 1.0, samples)
+    w = np.pi * np.array([[3.0], [40.0]])
+    series = SineSeries.of(2.0 - 5.0 * s + np.sin(w * s))
+    np.testing.assert_allclose(series.at(samples), 2.0 - 5.0 * at + np.sin(w * at), atol=1e-12)
+    np.testing.assert_allclose(series.at(samples, 1), -5.0 + w * np.cos(w * at), atol=1e-9)
+    np.testing.assert_allclose(series.at(samples, 2), -w * w * np.sin(w * at), atol=1e-7)
