@@ -16,9 +16,9 @@ from dmpcli.errors import InputError
 from dmpcli.figures import measured
 from dmpcli.figures.footing import AT_ONCE, Ground, placed
 from dmpcli.figures.stroke import LEAST, Stroke, as_drawn, over_of, role_of
-from dmpcli.measures.many_deviations import Taught
-from dmpcli.measures.many_motions import many_motions
-from dmpcli.measures.many_waves import ManyWaves, many_waves
+from dmpcli.measures.deviation import Taught
+from dmpcli.measures.motion import motions
+from dmpcli.measures.wave import ManyWaves, many_waves
 from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.records import dataset, marks, schemas
 from dmpcli.records import lesson as lessons
@@ -294,12 +294,12 @@ class _Block:
         column = {name: table[:, i] for i, name in enumerate(FIGURES)}
         gap = self.position - self.start.T[:, :, None]
         place = np.einsum("bji,jbn->ibn", self.axes, gap)
-        motions = many_motions(self.t, self.position, *self.aims)
+        moved = motions(self.t, self.position, *self.aims)
         for name in ("length", "peak_speed", "ldlj", "sparc"):
-            column[name][:] = getattr(motions, name)
+            column[name][:] = getattr(moved, name)
         if self.intended:
-            column["start_error"][:] = motions.start_error
-            column["goal_error"][:] = motions.goal_error
+            column["start_error"][:] = moved.start_error
+            column["goal_error"][:] = moved.goal_error
         column["duration"][:] = self.t[-1]
         flat = np.where(self.known[:, None], place[1], 0.0)
         waves = many_waves(flat, self.length, self.closed)

@@ -13,9 +13,9 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.figures import lag
 from dmpcli.figures.stroke import Stroke
-from dmpcli.measures import path, surface
-from dmpcli.measures.deviation import Deviation, deviation, nearest_distance
-from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
+from dmpcli.measures import surface
+from dmpcli.measures.deviation import Taught, nearest_distance
+from dmpcli.measures.motion import log_dimensionless_jerk, motions, path_length, spectral_arc_length
 from dmpcli.measures.timing import punctuality
 from dmpcli.records import marks
 from dmpcli.records.record import Record
@@ -33,9 +33,9 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
     reference : Stroke, optional
         The demonstration; the stroke's deviation is taken from it, start and goal aligned.
     """
-    start_error, goal_error = None, None
-    if stroke.intended and stroke.aims is not None:
-        start_error, goal_error = path.end_errors(stroke.position, *stroke.aims)
+    aims = stroke.aims if stroke.intended else None
+    motion = motions(stroke.t, stroke.position.T[:, None], *_ends(aims, stroke.position))
+    raw = stroke.raw.T[:, None]
     return {
         "stroke": stroke.label,
         "kind": stroke.kind,
@@ -47,17 +47,17 @@ def row_of(stroke: Stroke, reference: Stroke | None) -> Row:
         "samples": len(stroke.t),
         "start": stroke.start.tolist(),
         "goal": stroke.goal.tolist(),
-        "duration": path.duration(stroke.t),
-        "length": path.path_length(stroke.position),
-        "peak_speed": path.peak_speed(stroke.t, stroke.position),
+        "duration": float(stroke.t[-1] - stroke.t[0]),
+        "length": float(motion.length[0]),
+        "peak_speed": float(motion.peak_speed[0]),
         "wave": _wave(stroke),
         "as_recorded": _as_recorded(stroke),
         "deviation": _deviation(stroke, reference),
         "guide": _from_guide(stroke),
-        "ldlj": _finite(log_dimensionless_jerk(stroke.t, stroke.raw)),
-        "sparc": _finite(spectral_arc_length(stroke.t, stroke.raw)),
-        "start_error": start_error,
-        "goal_error": goal_error,
+        "ldlj": _finite(float(log_dimensionless_jerk(stroke.t, raw)[0])),
+        "sparc": _finite(float(spectral_arc_length(stroke.t, raw)[0])),
+        "start_error": None if aims is None else float(motion.start_error[0]),
+        "goal_error": None if aims is None else float(motion.goal_error[0]),
         "end_heights": list(stroke.end_heights),
         "surface": on_surface(stroke),
         "beyond_tolerance": stroke.mark,
@@ -71,10 +71,11 @@ def on_surface(stroke: Stroke) -> Row | None:
         return None
     wave, tilt = footing.wave, footing.tilt
     pieces = None if footing.uv is None else surface.stretch(footing.foot, footing.uv)
-    length = path.path_length(footing.foot)
+    length = path_length(footing.foot)
     taught = footing.demonstrated
-    meant = None if taught is None else path.path_length(taught[:, :2])
-    start_error, goal_error = path.end_errors(stroke.position, *footing.aims(stroke.end_heights))
+    meant = None if taught is None else path_length(taught[:, :2])
+    off = stroke.position[[0, -1]] - footing.aims(stroke.end_heights)
+    start_error, goal_error = np.linalg.norm(off, axis=1).tolist()
     return {
         "distance_max": float(footing.distance.max()),
         "distance_rms": _rms(footing.distance),
@@ -192,6 +193,10 @@ def distribution(values: Floats) -> Row | None:
     }
 
 
+def _ends(aims: Floats | None, position: Floats) -> Floats:
+    return (position[[0, -1]] if aims is None else aims)[:, None]
+
+
 def _wave(stroke: Stroke) -> Row:
     wave = stroke.wave
     t, where = wave.at(stroke.t), wave.at(stroke.position)
@@ -230,23 +235,21 @@ def _deviation(stroke: Stroke, reference: Stroke | None) -> Row | None:
         return None
     footing = stroke.footing
     if stroke.axes is None and footing and footing.place is not None:
-        if footing.demonstrated is None:
-            return None
         # On a curved surface strokes are compared in its chart.
-        taught = footing.demonstrated
-        return _from_recording(deviation(stroke.t, footing.place, reference.t, taught), reference)
-    aligned = reference.carried_to(stroke)
-    if aligned is None:
+        taught: Floats | None = footing.demonstrated
+        place: Floats | None = footing.place
+    else:
+        taught, place = reference.as_drawn_by(stroke), stroke.flat
+    if taught is None or place is None:
         return None
-    return _from_recording(deviation(stroke.t, stroke.position, reference.t, aligned), reference)
-
-
-def _from_recording(off: Deviation, reference: Stroke) -> Row:
-    """Deviation from the recording: with what smoothing took off it beyond its noise."""
+    off = Taught(reference.t, taught).deviations(stroke.t, place.T[:, None], np.ones(1))
+    # From the recording: with what smoothing took off it beyond its noise.
     rms, largest = reference.lost
-    return asdict(off) | {
-        "nearest_rms": float(np.hypot(off.nearest_rms, rms)),
-        "nearest_max": max(off.nearest_max, largest),
+    return {
+        "nearest_rms": float(np.hypot(off.nearest_rms[0], rms)),
+        "nearest_max": max(float(off.nearest_max[0]), largest),
+        "phase_rms": float(off.phase_rms[0]),
+        "phase_max": float(off.phase_max[0]),
     }
 
 

@@ -166,8 +166,11 @@ class Stroke:
     @cached_property
     def chart(self) -> Floats | None:
         """u, v, w in its own chart, shape (n, 3), mm; None where it has none."""
-        if self.place is not None:
-            return self.place
+        return self.flat if self.place is None else self.place
+
+    @cached_property
+    def flat(self) -> Floats | None:
+        """u, v, w on its plane, shape (n, 3), mm; None where it has none."""
         return None if self.axes is None else (self.position - self.start) @ self.axes
 
     def seen_for(self, other: "Stroke") -> "Stroke":
@@ -176,12 +179,18 @@ class Stroke:
             return self
         return self.recorded.stroke(other.lesson)
 
-    def carried_to(self, other: "Stroke") -> Floats | None:
-        """Positions with start, goal and plane laid upon another stroke's, shape (n, 3), mm."""
+    def as_drawn_by(self, other: "Stroke") -> Floats | None:
+        """u, v, w of this demonstration as another stroke should have them, shape (n, 3), mm."""
         if self.chart is None or other.axes is None:
             return None
         stretch = 1.0 if self.closed or other.closed else other.length / self.length
-        place = as_drawn(self.chart * [stretch, 1.0, 1.0], other.over, other.size, other.turn)
+        return as_drawn(self.chart * [stretch, 1.0, 1.0], other.over, other.size, other.turn)
+
+    def carried_to(self, other: "Stroke") -> Floats | None:
+        """Positions with start, goal and plane laid upon another stroke's, shape (n, 3), mm."""
+        place = self.as_drawn_by(other)
+        if place is None or other.axes is None:
+            return None
         return np.asarray(other.start + place @ other.axes.T)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.measures.wave import LINE, WaveHeights, wave_heights
+from dmpcli.measures.wave import WaveHeights, wave_heights
 
 Closest = Callable[[Floats], tuple[Floats, Floats]]
 """Points (n, 3), mm, to the closest points of the surface and the unit normals there, (n, 3)."""
@@ -118,9 +118,7 @@ def wave_along(uv: Floats, length: float) -> WaveHeights | None:
     v = uv[:, 1]
     if not np.isfinite(v).all():
         return None
-    if np.ptp(v) < LINE * length:
-        return WaveHeights(np.empty(0), np.empty(0))
-    return wave_heights(v)
+    return wave_heights(v, length=length)
 
 
 def tilt(rotation: Floats, normal: Floats) -> Floats:

@@ -7,13 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli import rotations
-from dmpcli.measures.deviation import (
-    carried,
-    deviation,
-    nearest_distance,
-    nearest_rms,
-)
+from dmpcli.measures.deviation import Taught, nearest_distance, nearest_rms
 
 
 def brute(point, polyline):
@@ -54,31 +48,29 @@ def test_nearest_rms_of_a_parallel_line_is_the_gap():
     assert nearest_rms(line + np.array([0.0, 0.25]), line) == pytest.approx(0.25, abs=1e-12)
 
 
-def test_same_shape_late_along_it_deviates_in_phase_but_not_in_shape():
+@pytest.mark.parametrize("count", [1, 7])
+def test_same_shape_late_along_it_deviates_in_phase_but_not_in_shape(count):
     t = np.linspace(0, 1, 201)
     line = np.column_stack([100 * t, 0 * t, 0 * t])
     late = np.column_stack([100 * t**2, 0 * t, 0 * t])
-    got = deviation(5 + 2 * t, late, t, line)
-    assert got.nearest_max == pytest.approx(0.0, abs=1e-9)
-    assert got.phase_max == pytest.approx(25.0, abs=1e-2)
+    strokes = np.repeat(late.T[:, None], count, axis=1)
+    got = Taught(t, line).deviations(5 + 2 * t, strokes, np.ones(count))
+    assert got.nearest_max == pytest.approx(np.zeros(count), abs=1e-9)
+    assert got.phase_max == pytest.approx(np.full(count, 25.0), abs=1e-2)
     # The integral of (t - t²)² over [0, 1] is 1/30.
-    assert got.phase_rms == pytest.approx(100 / np.sqrt(30), rel=1e-2)
+    assert got.phase_rms == pytest.approx(np.full(count, 100 / np.sqrt(30)), rel=1e-2)
 
 
-vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)
-
-
-@given(vectors, vectors, st.integers(0, 2**32 - 1))
-def test_carrying_undoes_a_rigid_motion(turn, move, seed):
+@given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.2, 5.0))
+def test_many_strokes_together_are_as_far_as_each_from_every_segment(seed, corners, stretch):
     rng = np.random.default_rng(seed)
-    path = np.cumsum(rng.standard_normal((20, 3)), axis=0)
-    R, C = rotations.exp(turn), rotations.exp(rng.standard_normal(3))
-    moved = path @ R.T + 100 * move
-    np.testing.assert_allclose(carried(path, path[0], C, moved[0], R @ C), moved, atol=1e-9)
-
-
-def test_carrying_stretches_along_the_line_alone():
-    path = np.array([[0.0, 0, 0], [5, 2, 1], [10, 0, 0]])
-    quarter_turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    got = carried(path, path[0], np.eye(3), np.ones(3), quarter_turn, stretch=2.0)
-    assert got == pytest.approx(np.array([[1.0, 1, 1], [-1, 11, 2], [1, 21, 1]]))
+    taught = np.cumsum(rng.standard_normal((corners, 3)), axis=0)
+    strokes = 3 * rng.standard_normal((6, 15, 3)) + taught.mean(axis=0)
+    factors = np.array([stretch, 1.0, 1.0, stretch, 1.0, 1.0])
+    found = Taught(np.arange(corners), taught).deviations(
+        np.arange(15.0), strokes.transpose(2, 0, 1), factors
+    )
+    for i, (stroke, factor) in enumerate(zip(strokes, factors, strict=True)):
+        far = np.array([brute(p, taught * [factor, 1.0, 1.0]) for p in stroke])
+        assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
+        assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
+from dmpcli.measures import motion
+
+
+def log_dimensionless_jerk(t, position, **more):
+    return float(motion.log_dimensionless_jerk(t, position.T[:, None], **more)[0])
+
+
+def spectral_arc_length(t, position, **more):
+    return float(motion.spectral_arc_length(t, position.T[:, None], **more)[0])
 
 
 def reach(n=1001, T=1.0, amplitude=100.0):

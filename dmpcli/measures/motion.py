@@ -1,7 +1,15 @@
-"""Length, speed, ends and smoothness of many strokes that share their times.
+"""How strokes move: length, speed, ends, and smoothness, of many that share their times.
 
-As `measures.path` and `measures.smoothness`, without a loop over strokes. Positions come with the
-components first, shape (3, B, n): each is then one block of memory.
+Positions come with the components first, shape (3, B, n): each is then one block of memory.
+
+References
+----------
+.. [1] N. Hogan, D. Sternad: Sensitivity of smoothness measures to movement duration, amplitude,
+   and arrests. Journal of Motor Behavior 41 (2009) 529-534.
+.. [2] S. Balasubramanian, A. Melendez-Calderon, E. Burdet: A robust and sensitive metric for
+   quantifying movement smoothness. IEEE Trans. Biomedical Engineering 59 (2012) 2126-2136.
+.. [3] S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet: On the analysis of
+   movement smoothness. Journal of NeuroEngineering and Rehabilitation 12:112 (2015).
 """
 
 from dataclasses import dataclass
@@ -10,10 +18,20 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.measures.smoothness import CUTOFF, ORDER
 from dmpcli.sine_series import zero_phase
 
-_THRESHOLD, _PADDING = 0.05, 4
+CUTOFF = 10.0
+"""Hz: above it a hand's movement holds noise only [3]; the same for files of every rate."""
+
+ORDER = 6
+"""Of the Butterworth low-pass, in one direction."""
+
+_THRESHOLD = 0.05
+"""The spectrum is cut above the last frequency whose share of the peak reaches this [3]."""
+
+_PADDING = 4
+"""Zeros fill the speed up to ``2**(ceil(log2 n) + padding)`` samples [3]."""
+
 _FEW = 0.3
 """A share of the spectrum up to which its lines are summed one by one rather than by FFT."""
 
@@ -30,7 +48,7 @@ class Motions:
     sparc: Floats
 
 
-def many_motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions:
+def motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions:
     """Measure how B strokes move.
 
     Parameters
@@ -43,36 +61,96 @@ def many_motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Mo
         Where each stroke should begin and end, mm.
     """
     step = _norm(position[..., 1:] - position[..., :-1])
-    dt, even = _even(t, position)
+    dt, even = _even(t, position, CUTOFF)
     return Motions(
         step.sum(axis=-1),
         (step / np.diff(t)).max(axis=-1),
         np.linalg.norm(position[..., 0].T - start, axis=1),
         np.linalg.norm(position[..., -1].T - goal, axis=1),
-        *_smoothness(dt, float(t[-1] - t[0]), even),
+        _ldlj(dt, float(t[-1] - t[0]), even),
+        _sparc(dt, even, CUTOFF),
     )
 
 
-def _smoothness(dt: float, T: float, p: Floats) -> tuple[Floats, Floats]:
-    """LDLJ and SPARC of evenly sampled, low-passed positions (3, B, n)."""
+def path_length(position: Floats) -> float:
+    """Length of a polyline, mm; noise lengthens it, nothing is smoothed here.
+
+    Parameters
+    ----------
+    position : array, shape (n, d)
+        mm.
+    """
+    return float(_norm(np.diff(position, axis=0).T).sum())
+
+
+def log_dimensionless_jerk(t: Floats, position: Floats, cutoff: float | None = CUTOFF) -> Floats:
+    """LDLJ [1, 3]: ``-ln(T³/v_peak² ∫|jerk|² dt)``; nearer to 0 is smoother.
+
+    It does not depend on the movement's amplitude or duration. A minimum-jerk reach has
+    -ln 204.8 = -5.322, the largest value of any movement from rest to rest.
+
+    Parameters
+    ----------
+    t : array, shape (n,)
+        Increasing, s; n ≥ 5.
+    position : array, shape (d, B, n)
+        mm.
+    cutoff : float, optional
+        Low-pass before differentiating, Hz; None leaves the samples as they are.
+
+    Returns
+    -------
+    array, shape (B,)
+        NaN for a tool that stands still.
+    """
+    dt, p = _even(t, position, cutoff)
+    return _ldlj(dt, float(t[-1] - t[0]), p)
+
+
+def spectral_arc_length(t: Floats, position: Floats, cutoff: float = CUTOFF) -> Floats:
+    """SPARC [2, 3]: minus the arc length of the speed's spectrum; nearer to 0 is smoother.
+
+    The spectrum is divided by its peak, its frequencies by the last one that counts.
+
+    Parameters
+    ----------
+    t : array, shape (n,)
+        Increasing, s; n ≥ 5.
+    position : array, shape (d, B, n)
+        mm.
+    cutoff : float
+        Highest frequency looked at, Hz.
+
+    Returns
+    -------
+    array, shape (B,)
+        NaN for a tool that stands still.
+    """
+    return _sparc(*_even(t, position, cutoff), cutoff)
+
+
+def _ldlj(dt: float, T: float, p: Floats) -> Floats:
+    """LDLJ of evenly sampled, low-passed positions (d, B, n)."""
     move = p[..., 1:] - p[..., :-1]
     step = _norm(move)
     bend = move[..., 1:] - move[..., :-1]
     jerk = bend[..., 1:] - bend[..., :-1]
     squared = np.einsum("cbn,cbn->bn", jerk, jerk) / dt**6
+    # Third differences reach to one sample from either end; the end values hold there.
     integral = dt * (squared.sum(axis=1) + squared[:, 0] + squared[:, -1])
     peak = step.max(axis=1) / dt
     moves = (peak > 0.0) & (integral > 0.0)
     safe = np.where(moves, peak, 1.0)
     ldlj = -np.log(T**3 / safe**2 * np.where(moves, integral, 1.0))
-    return np.where(moves, ldlj, np.nan), _sparc(step / dt, dt)
+    return np.where(moves, ldlj, np.nan)
 
 
-def _sparc(speed: Floats, dt: float) -> Floats:
-    """Spectral arc length of speeds (B, n), shape (B,)."""
+def _sparc(dt: float, p: Floats, cutoff: float) -> Floats:
+    """Spectral arc length of evenly sampled, low-passed positions (d, B, n)."""
+    speed = _norm(p[..., 1:] - p[..., :-1]) / dt
     n = speed.shape[1]
     size = 2 ** (int(np.ceil(np.log2(n))) + _PADDING)
-    lines = int(np.searchsorted(np.fft.rfftfreq(size, dt), CUTOFF, side="right"))
+    lines = int(np.searchsorted(np.fft.rfftfreq(size, dt), cutoff, side="right"))
     # Speeds are not negative, so that the spectrum is largest at rest.
     largest = speed.sum(axis=1)
     needed = _loud_at_most(speed, largest, size)
@@ -123,8 +201,8 @@ def _arc(spectrum: Floats) -> Floats:
     return np.where(last > 0, -pieces.sum(axis=1), np.nan)
 
 
-def _even(t: Floats, position: Floats) -> tuple[float, Floats]:
-    """Bring samples to even times and low-pass them, as `measures.smoothness` does."""
+def _even(t: Floats, position: Floats, cutoff: float | None) -> tuple[float, Floats]:
+    """Bring samples to even times (as many as given), low-passed without phase shift."""
     n = len(t)
     dt = float(t[-1] - t[0]) / (n - 1)
     even = t[0] + dt * np.arange(n)
@@ -133,12 +211,14 @@ def _even(t: Floats, position: Floats) -> tuple[float, Floats]:
         i = np.clip(np.searchsorted(t, even, side="right") - 1, 0, n - 2)
         share = np.clip((even - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
         p = p[..., i] + share * (p[..., i + 1] - p[..., i])
-    if 0.45 / dt <= CUTOFF:
+    if cutoff is None or 0.45 / dt <= cutoff:
         return dt, p
-    return dt, zero_phase(p, CUTOFF * dt, ORDER)
+    return dt, zero_phase(p, cutoff * dt, ORDER)
 
 
 def _norm(vectors: Floats) -> Floats:
-    """Lengths of vectors whose components come first, shape (3, ...)."""
-    x, y, z = vectors
-    return np.asarray(np.sqrt(x * x + y * y + z * z))
+    """Lengths of vectors whose components come first, shape (d, ...)."""
+    squared = vectors[0] * vectors[0]
+    for component in vectors[1:]:
+        squared += component * component
+    return np.asarray(np.sqrt(squared))
