@@ -67,7 +67,7 @@ def command(
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     from dmpcli.commands import surface_input
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.figures import document, many, stroke
+    from dmpcli.figures import document, many, strokes
     from dmpcli.records import streams
 
     if files.count("-") > 1:
@@ -92,7 +92,7 @@ def command(
     if surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit, quiet)
         ground, said, normal = _ground(read)
-    labels = stroke.labels_of(files)
+    labels = strokes.labels_of(files)
     parts = [
         _part(name, label, normal, form, quiet) for name, label in zip(files, labels, strict=True)
     ]
@@ -125,7 +125,7 @@ def _part(
     from dmpcli.figures.document import Part
     from dmpcli.figures.ranking import Pupil
     from dmpcli.figures.recorded import Recorded
-    from dmpcli.figures.stroke import states_of, strokes_of
+    from dmpcli.figures.strokes import states_of, strokes_of
     from dmpcli.records import lesson, record, schemas, skill, streams
 
     if name != streams.DASH and Path(name).is_dir():
@@ -155,7 +155,7 @@ def _batch(folder: Path, label: str, normal: "Floats | None", quiet: bool) -> "P
     """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
     from dmpcli.commands.messages import about, tell
     from dmpcli.figures.document import MOST_ROWS, Part
-    from dmpcli.figures.stroke import pairs_of, strokes_of
+    from dmpcli.figures.strokes import pairs_of, strokes_of
     from dmpcli.records import dataset, lesson, record, schemas, streams
 
     batch, odd = dataset.read(folder)

@@ -32,6 +32,7 @@ from dmpcli.records import (
 )
 from dmpcli.records import tables as records_tables
 from dmpcli.records.streams import Source
+from dmpcli.records.trajectory_reader import rows_by_id, stored
 
 NAME, VERSION = "inspection", 1
 
@@ -105,6 +106,9 @@ def as_text(found: Row, width: int) -> str:
 
 def _ours(source: Source) -> Row:
     found = record.decode(source)
+    if found.schema is schemas.TRAJECTORY:
+        for name, rows in rows_by_id(found.columns["id"]).items():
+            stored(found, name, rows)  # what could not be drawn is not described as if it could
     columns = []
     for name, values in found.columns.items():
         column = found.schema.columns[name]

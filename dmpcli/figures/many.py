@@ -15,7 +15,8 @@ from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.figures import measured
 from dmpcli.figures.footing import AT_ONCE, Ground, placed
-from dmpcli.figures.stroke import LEAST, Stroke, as_drawn, over_of, role_of
+from dmpcli.figures.stroke import LEAST, Stroke, as_drawn
+from dmpcli.figures.strokes import over_of, role_of
 from dmpcli.measures.deviation import Taught
 from dmpcli.measures.motion import motions
 from dmpcli.measures.wave import ManyWaves, many_waves

@@ -19,6 +19,7 @@ from dmpcli.records.pairs import GOAL, OK, START
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import NORMAL, Column, Schema
 from dmpcli.records.streams import Source
+from dmpcli.records.trajectory_reader import unit_normals
 
 AGAIN = "the command that draws it goes on from the parts that are there"
 
@@ -324,7 +325,7 @@ def _part(batch: Batch, file: str, rows: Integers, columns: Sequence[str]) -> It
     wanted = {n: named[n] for n in ("t", "x", "y", "z", *columns)}
     chosen = ["id", *(n for n in wanted if n in known)]
     expected = batch.ids.take(pa.array(rows))
-    done, groups = 0, part.metadata.num_row_groups
+    done, offset, groups = 0, 0, part.metadata.num_row_groups
     carried: dict[str, AnyArray] = {}
     waiting: str | None = None
     for group in range(groups):
@@ -347,8 +348,28 @@ def _part(batch: Batch, file: str, rows: Integers, columns: Sequence[str]) -> It
             ids, first = ids[:-1], first[:-1]
         _same(name, ids, expected, done)
         if len(ids):
-            yield Piece(name, provenance.facts, rows[done : done + len(ids)], first, found)
+            piece = Piece(name, provenance.facts, rows[done : done + len(ids)], first, found)
+            _check_normals(piece, batch, offset)
+            yield piece
+            offset += int(first[-1])
         done += len(ids)
+
+
+def _check_normals(piece: Piece, batch: Batch, offset: int) -> None:
+    """Refuse normals that are no unit vectors, or not those of the table or the part."""
+    if not piece.has(*schemas.NORMAL):
+        return
+    named = np.full((len(piece.rows), 3), np.nan)
+    if batch.normal is not None:
+        named = batch.normal[piece.rows]
+    if piece.facts.get("normal") is not None:
+        named = np.where(np.isfinite(named), named, piece.facts["normal"])
+    unit_normals(
+        f"{piece.name}: ",
+        np.column_stack([piece.columns[n] for n in schemas.NORMAL]),
+        np.repeat(named, np.diff(piece.first), axis=0),
+        offset + np.arange(int(piece.first[-1])),
+    )
 
 
 def _runs(column: Any, name: str) -> tuple[list[str], Integers]:

@@ -2,18 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas, streams
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
-from dmpcli.rotations import from_euler
+from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.streaming.plan import Stroke
 
 NAMED = 5
@@ -155,66 +154,12 @@ def _pair_facts(pairs: Record, row: int) -> dict[str, Any]:
 def _grouped(path: str) -> tuple[Record, dict[str, Integers]]:
     """Read a trajectory file; return it with the rows of each id, in order of appearance."""
     source = record.decode(streams.read(path), schemas.TRAJECTORY)
-    ids = source.columns["id"]
-    borders = np.flatnonzero(np.concatenate([[True], ids[1:] != ids[:-1], [True]]))
-    runs: dict[str, list[Integers]] = {}
-    for first, last in pairwise(borders.tolist()):
-        runs.setdefault(str(ids[first]), []).append(np.arange(first, last))
-    return source, {name: np.concatenate(rows) for name, rows in runs.items()}
+    return source, rows_by_id(source.columns["id"])
 
 
 def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> Found:
-    facts = dict(source.provenance.facts) | dict(more)
-    t = source.t[rows]
-    if len(t) < 2:
+    if len(rows) < 2:
         raise InputError(f"{source.name}: stroke {name} has one row; a motion needs at least two")
-    back = np.flatnonzero(np.diff(t) <= 0)
-    if len(back):
-        at = int(back[0]) + 1
-        raise InputError(
-            f"{source.name}: column 't', row {rows[at] + 1}: {t[at]:g} s does not come after "
-            f"{t[at - 1]:g} s; time must increase from row to row"
-        )
-    angles = _optional(source, schemas.EULER_ANGLES, rows)
-    stroke = Stroke(
-        name,
-        t,
-        source.position()[rows],
-        None if angles is None else from_euler(angles),
-        _normals(source, rows, facts),
-        int(rows[0]) + 1,
-    )
-    return Found(stroke, facts)
-
-
-def _optional(source: Record, names: tuple[str, ...], rows: Any) -> Floats | None:
-    """Return columns that a stroke may lack altogether, but not here and there."""
-    nothing = np.full(len(source), np.nan)
-    values = np.column_stack([source.columns.get(name, nothing)[rows] for name in names])
-    missing = np.isnan(values)
-    if missing.all():
-        return None
-    if missing.any():
-        row, column = np.argwhere(missing)[0]
-        raise InputError(
-            f"{source.name}: column {names[column]!r}, row {rows[row] + 1}: no value, though the "
-            f"stroke has some of {', '.join(names)}; fill it in or leave them all out"
-        )
-    return np.asarray(values, dtype=float)
-
-
-def _normals(source: Record, rows: Any, facts: Mapping[str, Any]) -> Floats | None:
-    normals = _optional(source, schemas.NORMAL, rows)
-    if normals is None:
-        if facts.get("normal") is None:
-            return None
-        normals = np.broadcast_to(np.asarray(facts["normal"], dtype=float), (len(rows), 3))
-    length = np.linalg.norm(normals, axis=1)
-    bad = np.flatnonzero(np.abs(length - 1.0) > 1e-3)
-    if len(bad):
-        raise InputError(
-            f"{source.name}: the normal at row {rows[bad[0]] + 1} has length "
-            f"{length[bad[0]]:.4g}; a unit normal is needed"
-        )
-    unit: Floats = normals / length[:, None]
-    return unit
+    one = stored(source, name, rows, source.provenance.facts | dict(more))
+    stroke = Stroke(name, one.t, one.position, one.rotation, one.normal, one.first_row)
+    return Found(stroke, one.facts)

@@ -6,7 +6,7 @@ import pytest
 from dmpcli.figures import document, tables
 from dmpcli.figures.contact import contact_of
 from dmpcli.figures.document import Part
-from dmpcli.figures.stroke import strokes_of
+from dmpcli.figures.strokes import strokes_of
 from dmpcli.records.record import Provenance
 from dmpcli.rotations import from_euler, to_euler
 from tests.figures.example_files import run, trajectory, wave

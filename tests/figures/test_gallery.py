@@ -11,7 +11,7 @@ import pytest
 from dmpcli.figures import drawing, gallery
 from dmpcli.figures.drawing import curve_of
 from dmpcli.figures.plane_curves import plane_curves
-from dmpcli.figures.stroke import strokes_of
+from dmpcli.figures.strokes import strokes_of
 from dmpcli.figures.time_curves import time_curves
 from dmpcli.primitives import smoothing
 from tests.figures.example_files import (

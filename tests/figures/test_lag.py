@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dmpcli.figures import lag, measured
-from dmpcli.figures.stroke import strokes_of
+from dmpcli.figures.strokes import strokes_of
 from dmpcli.records.record import Provenance
 from tests.figures.example_files import run, trajectory, wave
 

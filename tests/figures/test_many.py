@@ -8,7 +8,7 @@ from dmpcli.figures import measured
 from dmpcli.figures.batch import histogram, measure
 from dmpcli.figures.footing import Ground, placed
 from dmpcli.figures.many import FIGURES, Sight, measured_parts
-from dmpcli.figures.stroke import pairs_of, strokes_of
+from dmpcli.figures.strokes import pairs_of, strokes_of
 from dmpcli.primitives.smoothing import Stroke as Recording
 from dmpcli.records import dataset, record, schemas, streams
 from dmpcli.surfaces.mesh import Mesh

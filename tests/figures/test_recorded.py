@@ -6,7 +6,7 @@ import pytest
 from dmpcli.errors import InputError
 from dmpcli.figures.measured import row_of
 from dmpcli.figures.recorded import Recorded
-from dmpcli.figures.stroke import strokes_of
+from dmpcli.figures.strokes import strokes_of
 from dmpcli.measures.deviation import nearest_rms
 from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit

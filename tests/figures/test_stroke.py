@@ -5,7 +5,7 @@ import pytest
 
 from dmpcli import rotations
 from dmpcli.errors import InputError
-from dmpcli.figures.stroke import labels_of, pairs_of, strokes_of
+from dmpcli.figures.strokes import labels_of, pairs_of, strokes_of
 from dmpcli.primitives import smoothing
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record

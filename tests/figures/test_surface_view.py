@@ -8,7 +8,7 @@ import pytest
 from dmpcli.figures import document, gallery
 from dmpcli.figures.footing import Ground, placed
 from dmpcli.figures.measured import row_of
-from dmpcli.figures.stroke import strokes_of
+from dmpcli.figures.strokes import strokes_of
 from dmpcli.figures.surface_picture import MOST_FACES, picture
 from dmpcli.figures.surface_view import surface_view
 from dmpcli.primitives import smoothing

@@ -1,0 +1,158 @@
+"""The trajectories of a file: one reader for all who draw, measure or describe them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import AnyArray, Floats, Integers
+from dmpcli.errors import InputError
+from dmpcli.records import schemas
+from dmpcli.records.record import Record
+from dmpcli.rotations import from_euler
+from dmpcli.spatial.trajectory import Trajectory
+
+UNIT = 1e-3
+"""By how much the length of a unit normal may miss 1, and its direction another's, rad."""
+
+
+@dataclass(frozen=True)
+class StoredTrajectory(Trajectory):
+    """A trajectory as its file says it.
+
+    Attributes
+    ----------
+    id : str
+    first_row : int
+        Row of the file that holds the first sample, counted from 1.
+    facts : dict
+        What the file says beside it; of a batch, with the start, goal and normal of its pair.
+    """
+
+    id: str = ""
+    first_row: int = 1
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
+    """Return the rows of each id, in order of first appearance."""
+    borders = np.flatnonzero(np.concatenate([[True], ids[1:] != ids[:-1], [True]]))
+    runs: dict[str, list[Integers]] = {}
+    for first, last in pairwise(borders.tolist()):
+        runs.setdefault(str(ids[first]), []).append(np.arange(first, last))
+    return {name: np.concatenate(rows) for name, rows in runs.items()}
+
+
+def stored(
+    record: Record, name: str, rows: Integers, facts: Mapping[str, Any] | None = None
+) -> StoredTrajectory:
+    """Return some rows of a record as one trajectory.
+
+    Parameters
+    ----------
+    record : Record
+        Of a trajectory file or a run.
+    name : str
+        Its id.
+    rows : array of int, shape (n,)
+    facts : mapping, optional
+        What is known of it; by default what the file says.
+
+    Raises
+    ------
+    InputError
+        Time does not increase; an orientation or normal is missing here and there; a normal is
+        no unit vector, or is not the one that the file or the batch names. By column and row.
+    """
+    facts = dict(record.provenance.facts if facts is None else facts)
+    t = record.t[rows]
+    back = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(back):
+        at = int(back[0]) + 1
+        raise InputError(
+            f"{_of(record)}column 't', row {rows[at] + 1}: {t[at]:g} s does not come after "
+            f"{t[at - 1]:g} s; time must increase from row to row"
+        )
+    angles = _optional(record, schemas.EULER_ANGLES, rows)
+    return StoredTrajectory(
+        t,
+        record.position()[rows],
+        None if angles is None else from_euler(angles),
+        _normals(record, rows, facts),
+        name,
+        int(rows[0]) + 1 if len(rows) else 1,
+        facts,
+    )
+
+
+def _of(record: Record) -> str:
+    return f"{record.name}: " if record.name else ""
+
+
+def _optional(record: Record, names: tuple[str, ...], rows: Integers) -> Floats | None:
+    """Return columns that a trajectory may lack altogether, but not here and there."""
+    nothing = np.full(len(record), np.nan)
+    values = np.column_stack([record.columns.get(name, nothing)[rows] for name in names])
+    missing = np.isnan(values)
+    if missing.all():
+        return None
+    if missing.any():
+        row, column = np.argwhere(missing)[0]
+        raise InputError(
+            f"{_of(record)}column {names[column]!r}, row {rows[row] + 1}: no value, though the "
+            f"stroke has some of {', '.join(names)}; fill it in or leave them all out"
+        )
+    return np.asarray(values, dtype=float)
+
+
+def _normals(record: Record, rows: Integers, facts: Mapping[str, Any]) -> Floats | None:
+    """Return the unit normals, shape (n, 3): of each row, else the one that the file names."""
+    named, normals = facts.get("normal"), _optional(record, schemas.NORMAL, rows)
+    one = None if named is None else np.broadcast_to(np.asarray(named, float), (len(rows), 3))
+    return unit_normals(_of(record), normals, one, rows)
+
+
+def unit_normals(
+    name: str, normals: Floats | None, named: Floats | None, rows: Integers
+) -> Floats | None:
+    """Return the unit normals of some rows, shape (n, 3), mm; None where nothing says them.
+
+    Parameters
+    ----------
+    name : str
+        What messages begin with.
+    normals : array, shape (n, 3), or None
+        By row.
+    named : array, shape (n, 3), or None
+        What file or batch name for all rows of a trajectory; NaN where they name none.
+    rows : array of int, shape (n,)
+        Of the file, from 0.
+
+    Raises
+    ------
+    InputError
+        One is no unit vector, or the two contradict each other.
+    """
+    for some, where in ((named, "that the file names"), (normals, "")):
+        if some is not None:
+            length = np.linalg.norm(some, axis=1)
+            bad = np.flatnonzero(np.abs(length - 1.0) > UNIT)
+            if len(bad):
+                where = where or f"at row {rows[bad[0]] + 1}"
+                raise InputError(
+                    f"{name}the normal {where} has length {length[bad[0]]:.4g}; a unit normal is "
+                    "needed"
+                )
+    if normals is not None and named is not None:
+        apart = np.linalg.norm(normals - named, axis=1)
+        bad = np.flatnonzero(apart > 2.0 * UNIT)
+        if len(bad):
+            angle = np.degrees(2.0 * np.arcsin(min(0.5 * apart[bad[0]], 1.0)))
+            raise InputError(
+                f"{name}the normal at row {rows[bad[0]] + 1} (nx, ny, nz) lies {angle:.3g}° off "
+                "the one that is named for the whole stroke; leave one of them out"
+            )
+    found = named if normals is None else normals
+    return None if found is None else found / np.linalg.norm(found, axis=1, keepdims=True)
