@@ -13,7 +13,8 @@ from dmpcli.measures.paper import EXPERIMENTS, REPRODUCTION, Experiment
 from dmpcli.measures.wave import stroke_wave
 from dmpcli.primitives import references
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.drawing import draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.skill import Skill

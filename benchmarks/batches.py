@@ -31,7 +31,8 @@ from dmpcli.arrays import Floats
 from dmpcli.batch import memory
 from dmpcli.batch.job import Task
 from dmpcli.commands.batches import PAIRS_PER_PART
-from dmpcli.primitives.drawing import Style, draw_blocks
+from dmpcli.primitives.drawing import draw_blocks
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.records import skill as skill_file
 from dmpcli.records import streams

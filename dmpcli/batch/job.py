@@ -14,7 +14,8 @@ from uuid import uuid4
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.primitives.drawing import Block, Stroke, Style, draw_blocks
+from dmpcli.primitives.drawing import draw_blocks
+from dmpcli.primitives.drawn_strokes import Block, Stroke, Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.reach import Reach
 from dmpcli.primitives.skill import Skill

@@ -20,7 +20,7 @@ from dmpcli.errors import InputError, RefusedError
 
 if TYPE_CHECKING:
     from dmpcli.commands.surface_input import SurfaceInput
-    from dmpcli.primitives.drawing import Style
+    from dmpcli.primitives.drawn_strokes import Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable

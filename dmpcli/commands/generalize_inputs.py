@@ -9,7 +9,7 @@ from dmpcli.errors import InputError
 if TYPE_CHECKING:
     from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.primitives.contact_heights import ContactHeights
-    from dmpcli.primitives.drawing import Style
+    from dmpcli.primitives.drawn_strokes import Style
     from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.pairs import PairTable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats, Integers
     from dmpcli.primitives.admission import Admission
-    from dmpcli.primitives.drawing import Style
+    from dmpcli.primitives.drawn_strokes import Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.pairs import PairTable
     from dmpcli.surfaces.protocol import Surface

@@ -10,7 +10,7 @@ from dmpcli.errors import InputError, counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dmpcli.primitives.drawing import OnBorder, Stroke, Style
+    from dmpcli.primitives.drawn_strokes import OnBorder, Stroke, Style
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
@@ -68,7 +68,7 @@ def leaving(on_border: str) -> "OnBorder":
     """
     from typing import get_args
 
-    from dmpcli.primitives.drawing import OnBorder
+    from dmpcli.primitives.drawn_strokes import OnBorder
 
     for choice in get_args(OnBorder):
         if on_border == choice:

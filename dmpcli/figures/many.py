@@ -109,8 +109,8 @@ class Sight:
             return self
         if drawn not in self._others:
             at = self.reference
-            if at.recorded is not None and drawn.lesson is not None:
-                at = at.recorded.stroke(drawn.lesson)
+            if at.seen_by is not None and drawn.lesson is not None:
+                at = at.seen_by(drawn.lesson)
             self._others[drawn] = replace(self, reference=at, drawn=drawn, _others={})
         return self._others[drawn]
 

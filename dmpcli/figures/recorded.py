@@ -192,7 +192,7 @@ class Recorded:
             if origin.facts.get("noise_free")
             else _guide(origin.facts.get("reference")),
             "staged": origin.command != "record" or "reference" in origin.facts,
-            "recorded": self,
+            "seen_by": self.stroke,
         }
 
 

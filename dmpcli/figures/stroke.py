@@ -1,21 +1,18 @@
 """A stroke: one curve of a file, with what is needed to measure and to draw it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.figures.surface_placement import Footing
 from dmpcli.measures.surface import wave_along
 from dmpcli.measures.wave import WaveHeights, stroke_wave
 from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.records.lesson import Lesson
 from dmpcli.surfaces import plane
-
-if TYPE_CHECKING:
-    from dmpcli.figures.footing import Footing
-    from dmpcli.figures.recorded import Recorded
 
 NEAR = 1.0
 """Strokes whose starts and goals are this near to each other lie at the same place, mm."""
@@ -68,8 +65,8 @@ class Stroke:
         How the stroke lies on a surface that it was measured on.
     lesson : Lesson, optional
         How the skill that drew it saw its recordings; of a demonstration, how it is seen.
-    recorded : Recorded, optional
-        What a demonstration is a view of.
+    seen_by : callable, optional
+        A demonstration as another skill saw it.
     place : array, shape (n, 3), optional
         u, v, w of a demonstration on the surface that it was taught on, mm; else its plane's axes
         tell them.
@@ -114,9 +111,9 @@ class Stroke:
     side: Floats | None = None
     bound: bool = True
     staged: bool = True
-    footing: "Footing | None" = None
+    footing: Footing | None = None
     lesson: Lesson | None = None
-    recorded: "Recorded | None" = None
+    seen_by: "Callable[[Lesson], Stroke] | None" = None
     place: Floats | None = None
     geodesic: float | None = None
     lost: tuple[float, float] = (0.0, 0.0)
@@ -165,9 +162,9 @@ class Stroke:
 
     def seen_for(self, other: "Stroke") -> "Stroke":
         """Return this demonstration as the skill saw it that drew another stroke."""
-        if self.recorded is None or other.lesson is None:
+        if self.seen_by is None or other.lesson is None:
             return self
-        return self.recorded.stroke(other.lesson)
+        return self.seen_by(other.lesson)
 
     def as_drawn_by(self, other: "Stroke") -> Floats | None:
         """u, v, w of this demonstration as another stroke should have them, shape (n, 3), mm."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.primitives.contact_heights import demonstrated_scale
-from dmpcli.primitives.drawing import Style
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.sides import turned_over
 from dmpcli.primitives.skill import Skill

@@ -2,28 +2,25 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.arrays import Integers
+from dmpcli.primitives.drawn_strokes import Block, Style
 from dmpcli.primitives.pieces import LEAST_LENGTH, Path, Span, inside, retimed
 from dmpcli.primitives.retiming import Timing
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.protocol import LEAVES, Status
 
-if TYPE_CHECKING:
-    from dmpcli.primitives.drawing import Block, Style
-
 # Samples of a path whose speed is to be held: per second of the demonstration, and at least.
 _FINE, _LEAST_FINE = 50.0, 1201
 _FINE_AT_ONCE = 300_000
 
-Redraw = Callable[[Integers, Timing, "Style"], "Block"]
+Redraw = Callable[[Integers, Timing, Style], Block]
 """Draws some of the pairs, by their rows, with another timing and style."""
 
 
-def applied(block: "Block", skill: Skill, style: "Style", redraw: Redraw) -> "Iterator[Block]":
+def applied(block: Block, skill: Skill, style: Style, redraw: Redraw) -> Iterator[Block]:
     """Draw strokes once more, each by its own timing, where the style asks for that.
 
     Parameters
@@ -56,13 +53,13 @@ def applied(block: "Block", skill: Skill, style: "Style", redraw: Redraw) -> "It
 
 
 def _again(
-    one: "Block",
+    one: Block,
     spans: list[Span],
     path: Path | None,
     skill: Skill,
-    style: "Style",
+    style: Style,
     redraw: Redraw,
-) -> "Block":
+) -> Block:
     when, tau = one.timing, skill.spring.tau
     eases = (style.ease_in, style.ease_out)
     stroke, cuts = retimed(spans, when.stroke, path, style.pace, style.rate, when.tau / tau, eases)
@@ -80,7 +77,7 @@ def _whole(when: Timing) -> Span:
     return float(when.stroke[0]), float(when.stroke[-1])
 
 
-def _spans(one: "Block", style: "Style") -> list[Span]:
+def _spans(one: Block, style: Style) -> list[Span]:
     """Parts of a stroke that are drawn; none of one that is refused."""
     status = one.status[0]
     if status == Status.DRAWN:
@@ -97,7 +94,7 @@ def _fine(skill: Skill) -> int:
     return max(_LEAST_FINE, 1 + round(_FINE * skill.duration))
 
 
-def _paths(block: "Block", skill: Skill, style: "Style", redraw: Redraw) -> list[Path | None]:
+def _paths(block: Block, skill: Skill, style: Style, redraw: Redraw) -> list[Path | None]:
     """Strokes with their samples close together, where their speed is to be held."""
     if style.pace is None:
         return [None] * len(block)

@@ -19,7 +19,7 @@ from dmpcli.primitives.wrench import Tool
 from dmpcli.rotations import exp, from_euler, log, smallest_between
 
 if TYPE_CHECKING:  # what draws strokes is not needed to execute one
-    from dmpcli.primitives.drawing import Stroke
+    from dmpcli.primitives.drawn_strokes import Stroke
 
 NEAR = 0.1
 """A measure of a singularity below this is worth a word: 6° of joint 3 or 5."""

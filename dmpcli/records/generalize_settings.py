@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dmpcli.primitives.drawing import Style
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Amplitude, Orientation
 from dmpcli.records.process_settings import ProcessSettings
 

@@ -8,7 +8,7 @@ import numpy as np
 from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.primitives.contact_heights import ContactHeights, end_heights
-from dmpcli.primitives.drawing import Block, Stroke, Style
+from dmpcli.primitives.drawn_strokes import Block, Stroke, Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
 from dmpcli.records import marks, schemas

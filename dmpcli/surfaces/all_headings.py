@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import any_tangent, cross, dot, length, unit
 
 # Lines are looked for up to so many times the chord, one after the other, and then as long as the
@@ -31,12 +31,12 @@ _MOST = 400_000
 _PAIRS_AT_ONCE = 32
 
 
-def find(mesh: Mesh, origin: Floats, goal: Floats) -> tuple[Floats, Floats, Booleans]:
+def find(mesh: TriangleMesh, origin: Floats, goal: Floats) -> tuple[Floats, Floats, Booleans]:
     """Find the shortest straight line over the facets from each origin to its goal.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : TriangleMesh
     origin, goal : array, shape (B, 3)
         Points of the mesh, mm.
 
@@ -78,7 +78,7 @@ class _Pairs:
     e_y: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, origin: Floats, goal: Floats) -> "_Pairs":
+    def of(cls, mesh: TriangleMesh, origin: Floats, goal: Floats) -> "_Pairs":
         _, face = mesh.search(np.concatenate([origin, goal]))
         face, goal_face = face[: len(origin)], face[len(origin) :]
         inside = origin + _INTO * (mesh.corners[face].mean(axis=1) - origin)
@@ -117,7 +117,7 @@ class _Windows:
 
 
 def _look(
-    mesh: Mesh,
+    mesh: TriangleMesh,
     pairs: _Pairs,
     left: Integers,
     longest: Floats,
@@ -151,7 +151,7 @@ def _plane(pairs: _Pairs, pair: Integers, points: Floats) -> Floats:
     return np.stack([dot(off, pairs.e_x[pair])[:, 0], dot(off, pairs.e_y[pair])[:, 0]], axis=1)
 
 
-def _first(mesh: Mesh, pairs: _Pairs, left: Integers) -> _Windows:
+def _first(mesh: TriangleMesh, pairs: _Pairs, left: Integers) -> _Windows:
     """Windows of the edges of the origins' own facets."""
     pair, edge = np.repeat(left, 3), np.tile(np.arange(3), len(left))
     face = pairs.face[pair]
@@ -160,7 +160,7 @@ def _first(mesh: Mesh, pairs: _Pairs, left: Integers) -> _Windows:
     return _crossed(mesh, _Windows(pair, face, edge, a, b, _unit(a), _unit(b)))
 
 
-def _crossed(mesh: Mesh, seen: _Windows) -> _Windows:
+def _crossed(mesh: TriangleMesh, seen: _Windows) -> _Windows:
     """Windows as seen from the facets behind their edges, numbered in those; borders end them."""
     after = mesh.topology.neighbours[seen.face, seen.edge]
     wide = _cross(seen.right, seen.left) > _NARROW
@@ -170,7 +170,9 @@ def _crossed(mesh: Mesh, seen: _Windows) -> _Windows:
     return _Windows(some.pair, after[on], edge, some.a, some.b, some.right, some.left)
 
 
-def _note(mesh: Mesh, pairs: _Pairs, windows: _Windows, best: Floats, heading: Floats) -> None:
+def _note(
+    mesh: TriangleMesh, pairs: _Pairs, windows: _Windows, best: Floats, heading: Floats
+) -> None:
     """Note goals that are seen through windows of their facets, nearer than any before."""
     if len(windows) == 0:
         return
@@ -184,7 +186,7 @@ def _note(mesh: Mesh, pairs: _Pairs, windows: _Windows, best: Floats, heading: F
     best[windows.pair[closer]], heading[windows.pair[closer]] = size[closer], way[closer]
 
 
-def _unfolded(mesh: Mesh, windows: _Windows, points: Floats) -> Floats:
+def _unfolded(mesh: TriangleMesh, windows: _Windows, points: Floats) -> Floats:
     """Points (W, 3) of the facets behind the windows, unfolded into the plane, (W, 2)."""
     # The edge runs from b to a in the facet behind it.
     b = mesh.corners[windows.face, windows.edge]
@@ -198,7 +200,7 @@ def _unfolded(mesh: Mesh, windows: _Windows, points: Floats) -> Floats:
     return result
 
 
-def _behind(mesh: Mesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> _Windows:
+def _behind(mesh: TriangleMesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> _Windows:
     """Windows of the other two edges of the facets behind, where lines up to `limit` (B,) come."""
     windows = windows.rows(_within(mesh, pairs, windows, limit))
     far = mesh.corners[windows.face, (windows.edge + 2) % 3]
@@ -220,7 +222,7 @@ def _behind(mesh: Mesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> _Win
     return _crossed(mesh, _Windows(*both))
 
 
-def _within(mesh: Mesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> Booleans:
+def _within(mesh: TriangleMesh, pairs: _Pairs, windows: _Windows, limit: Floats) -> Booleans:
     """Tell which windows a line no longer than `limit` can pass on its way to the goal."""
     step = windows.b - windows.a
     start, end = (
@@ -245,7 +247,7 @@ def _off_segment(p: Floats, way: Floats, point: Floats) -> Floats:
     return rest
 
 
-def _along_edges(mesh: Mesh, pairs: _Pairs, rows: Integers) -> Floats:
+def _along_edges(mesh: TriangleMesh, pairs: _Pairs, rows: Integers) -> Floats:
     """Lengths of the shortest ways along the edges, shape (R,), mm; 0 where there is none."""
     a, b = mesh.F.reshape(-1), np.roll(mesh.F, -1, axis=1).reshape(-1)
     sizes = length(mesh.V[b] - mesh.V[a])[:, 0]

@@ -5,11 +5,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces import last_check, shooting, strip, thin_walls, unfolding
-from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces import last_check, shooting, slit_crossings, strip, thin_walls, unfolding
 from dmpcli.surfaces.nodes import Centre
 from dmpcli.surfaces.protocol import Lift, Status, Walks, first_refusal, towards
 from dmpcli.surfaces.shooting import Aim
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import across, cross, dot, length
 from dmpcli.surfaces.walked import closed_direction, goal_coordinates, walk_samples
 
@@ -33,7 +33,7 @@ class MeshCharts:
 
     Attributes
     ----------
-    mesh : Mesh
+    mesh : TriangleMesh
     centre : Centre
         B centre lines.
     target : array, shape (B, 3)
@@ -47,7 +47,7 @@ class MeshCharts:
         Pairs whose geodesic crosses a crease and was found by unfolding.
     """
 
-    mesh: Mesh
+    mesh: TriangleMesh
     centre: Centre
     target: Floats
     lengths: Floats
@@ -180,7 +180,7 @@ class MeshCharts:
         """Mark the strokes of some pairs that step over an edge where sheets touch."""
         if len(self.mesh.slits) == 0:
             return
-        crossed = self.mesh.slits.crossed(self.mesh, foot[rows])
+        crossed = slit_crossings.crossed(self.mesh, foot[rows])
         outside[rows] |= crossed
         hit = rows[crossed.any(axis=1)]
         status[hit] = first_refusal(status[hit], np.full(len(hit), Status.BORDER))
@@ -271,7 +271,7 @@ def _folded(foot: Floats, axes: Floats, coordinates: Floats) -> Booleans:
 
 
 def mesh_charts(
-    mesh: Mesh, start: Floats, goal: Floats, side: Floats | None, closed: Floats | None
+    mesh: TriangleMesh, start: Floats, goal: Floats, side: Floats | None, closed: Floats | None
 ) -> MeshCharts:
     """Charts of a mesh; see `Surface.charts`."""
     a, b = mesh.closest(start), mesh.closest(goal)
@@ -319,7 +319,7 @@ class Link:
     creased: Booleans
 
 
-def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
+def connect(mesh: TriangleMesh, centre: Centre, goal: Floats, status: Integers) -> Link:
     """Find the geodesics from the charts' starts to points (B, 3) of the mesh.
 
     Stepped along the smooth normal; unfolded where that meets a crease or does not arrive. Pairs
@@ -354,7 +354,7 @@ def connect(mesh: Mesh, centre: Centre, goal: Floats, status: Integers) -> Link:
     return Link(direction, normal, step, lengths, status, creased)
 
 
-def _landed(mesh: Mesh, first: Aim, aim: Aim, ends: shooting.Ends) -> Booleans:
+def _landed(mesh: TriangleMesh, first: Aim, aim: Aim, ends: shooting.Ends) -> Booleans:
     """Tell which smooth courses end at their goals, on the goals' side, and are no short cuts.
 
     There are none over holes on solids, where what was stepped over is a rib or a groove.
@@ -370,7 +370,7 @@ def _landed(mesh: Mesh, first: Aim, aim: Aim, ends: shooting.Ends) -> Booleans:
 
 
 def _stepped(
-    mesh: Mesh, aim: Aim, ends: shooting.Ends, rows: Integers, which: Booleans
+    mesh: TriangleMesh, aim: Aim, ends: shooting.Ends, rows: Integers, which: Booleans
 ) -> Integers:
     """Step along what some of the rows found from facet to facet; which can be had that way."""
     some = np.flatnonzero(which)
@@ -388,7 +388,7 @@ def _stepped(
     return stepped
 
 
-def walk(mesh: Mesh, origin: Floats, direction: Floats, way: Floats) -> Walks:
+def walk(mesh: TriangleMesh, origin: Floats, direction: Floats, way: Floats) -> Walks:
     """Walk geodesics; see `Surface.walk`. Stepped, and unfolded at creases and borders."""
     shape = np.shape(origin)
     hits = mesh.closest(np.asarray(origin, dtype=float).reshape(-1, 3))

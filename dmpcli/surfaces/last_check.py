@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.mesh import CREASE, Mesh
 from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
 from dmpcli.surfaces.vectors import dot, length
 
 # Start and goal are met within this, mm, and within the noise of the mesh there, which tilts its
@@ -51,12 +51,14 @@ class Feet:
     outside: Booleans
 
 
-def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats) -> Integers:
+def refusals(
+    mesh: TriangleMesh, feet: Feet, start: Floats, goal: Floats, goals: Floats
+) -> Integers:
     """Tell which strokes are wrong, and how.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : TriangleMesh
     feet : Feet
         B strokes.
     start, goal : array, shape (B, 3)
@@ -81,7 +83,7 @@ def refusals(mesh: Mesh, feet: Feet, start: Floats, goal: Floats, goals: Floats)
     return np.select(which, what, np.int64(Status.DRAWN))
 
 
-def unsound(mesh: Mesh, feet: Feet) -> Booleans:
+def unsound(mesh: TriangleMesh, feet: Feet) -> Booleans:
     """Tell which points (B, T) of strokes are wrong, whether or not they come after a border.
 
     Of a torn stroke these are both points beside the tear.
@@ -96,7 +98,9 @@ def unsound(mesh: Mesh, feet: Feet) -> Booleans:
     return wrong
 
 
-def shorter_than_chord(mesh: Mesh, start: Floats, goal: Floats, lengths: Floats) -> Booleans:
+def shorter_than_chord(
+    mesh: TriangleMesh, start: Floats, goal: Floats, lengths: Floats
+) -> Booleans:
     """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise."""
     chord = length(goal - start)[:, 0]
     noise = mesh.noise[mesh.search(np.stack([start, goal]).reshape(-1, 3))[1]]
@@ -119,7 +123,7 @@ def _jumps(feet: Feet) -> Booleans:
 
 
 def _missed(
-    mesh: Mesh, feet: Feet, on: Booleans, start: Floats, goal: Floats, goals: Floats
+    mesh: TriangleMesh, feet: Feet, on: Booleans, start: Floats, goal: Floats, goals: Floats
 ) -> Booleans:
     missed = np.zeros(len(start), dtype=bool)
     for at, point, of in ((0, start, 0.0 * goals), (-1, goal, goals)):
@@ -139,13 +143,15 @@ def _off(plane: Floats, feet: Feet) -> Floats:
     return np.asarray(np.abs(off))
 
 
-def _tilted(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
+def _tilted(mesh: TriangleMesh, plane: Floats, feet: Feet, on: Booleans) -> Booleans:
     tilted = np.zeros(len(feet.face), dtype=bool)
     tilted[_leaning(mesh, plane, feet, on)[0]] = True
     return tilted
 
 
-def _leaning(mesh: Mesh, plane: Floats, feet: Feet, on: Booleans) -> tuple[Integers, Integers]:
+def _leaning(
+    mesh: TriangleMesh, plane: Floats, feet: Feet, on: Booleans
+) -> tuple[Integers, Integers]:
     """Rows and samples of the points whose normals lean off their facets outside noise."""
     lean = np.abs(np.einsum("bti,bti->bt", feet.normal, plane[..., :3]))
     rows, samples = np.nonzero((lean < _TILTED) & on)

@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import stepping
-from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import cross, dot, unit
 
 # Central fourth-order differences, and their one-sided forms for the two nodes at either end.
@@ -93,7 +93,7 @@ class Nodes:
 
 
 def walk_nodes(
-    mesh: Mesh, centre: Centre, grid: Grid, cross_step: Floats, cells: Booleans
+    mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, cells: Booleans
 ) -> Nodes:
     """Walk the centre line both ways, then the cross lines from its nodes, both ways.
 
@@ -196,7 +196,7 @@ class _Lines:
 
     def walk(
         self,
-        mesh: Mesh,
+        mesh: TriangleMesh,
         at: int,
         counts: tuple[Integers, Integers],
         step: Floats,
@@ -225,7 +225,7 @@ class _Lines:
 
     def _fill(
         self,
-        mesh: Mesh,
+        mesh: TriangleMesh,
         front: stepping.Front,
         rows: Integers,
         at: int,

@@ -7,7 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import all_headings, stepping, unfolding
-from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import across, cross, dot, length, turned
 
 # Steps of the centre line are no longer than this, mm, and there are at least four.
@@ -89,7 +89,7 @@ class Ends:
             getattr(self, field.name)[rows] = getattr(other, field.name)[which]
 
 
-Shot = Callable[[Mesh, Aim], Ends]
+Shot = Callable[[TriangleMesh, Aim], Ends]
 
 
 def take_aim(origin: Floats, normal: Floats, goal: Floats, sign: Floats, part: Integers) -> Aim:
@@ -100,7 +100,7 @@ def take_aim(origin: Floats, normal: Floats, goal: Floats, sign: Floats, part: I
     return Aim(origin, normal, goal, across(chord, normal), size, steps, sign, part)
 
 
-def by_steps(mesh: Mesh, aim: Aim) -> Ends:
+def by_steps(mesh: TriangleMesh, aim: Aim) -> Ends:
     """Shoot along the smooth normal."""
     front, _ = stepping.start(
         mesh,
@@ -127,7 +127,7 @@ def by_steps(mesh: Mesh, aim: Aim) -> Ends:
     return ends
 
 
-def by_facets(mesh: Mesh, aim: Aim) -> Ends:
+def by_facets(mesh: TriangleMesh, aim: Aim) -> Ends:
     """Shoot from facet to facet."""
     end = unfolding.walk(mesh, aim.origin, aim.direction, aim.length[:, 0])
     normal = aim.sign * end.normal
@@ -136,7 +136,7 @@ def by_facets(mesh: Mesh, aim: Aim) -> Ends:
     )
 
 
-def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
+def hit(mesh: TriangleMesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     """Correct shots until they hit.
 
     A secant step in the heading, whose lever is the width by which neighbouring geodesics spread
@@ -169,7 +169,9 @@ def hit(mesh: Mesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     return found, ends, miss <= HIT
 
 
-def _corrected(mesh: Mesh, aim: Aim, shot: Shot, stands_off: Floats) -> tuple[Aim, Ends, Floats]:
+def _corrected(
+    mesh: TriangleMesh, aim: Aim, shot: Shot, stands_off: Floats
+) -> tuple[Aim, Ends, Floats]:
     """Correct shots; ends may be over or under the goal by less than `stands_off` (B,), mm."""
     count = len(aim.steps)
     best = aim.rows(np.arange(count))
@@ -210,13 +212,13 @@ def _corrected(mesh: Mesh, aim: Aim, shot: Shot, stands_off: Floats) -> tuple[Ai
     return best, ends, miss
 
 
-def corrected(mesh: Mesh, aim: Aim) -> tuple[Aim, Ends, Booleans]:
+def corrected(mesh: TriangleMesh, aim: Aim) -> tuple[Aim, Ends, Booleans]:
     """Correct shots along the smooth normal from where they aim, and no others; see `hit`."""
     found, ends, miss = _corrected(mesh, aim, by_steps, mesh.reach[mesh.search(aim.goal)[1]])
     return found, ends, miss <= HIT
 
 
-def _of_all_headings(mesh: Mesh, aim: Aim, _shot: Shot) -> Aim:
+def _of_all_headings(mesh: TriangleMesh, aim: Aim, _shot: Shot) -> Aim:
     """Aim along the shortest straight lines over the facets, where there are any."""
     heading, size, found = all_headings.find(mesh, aim.origin, aim.goal)
     chosen = aim.rows(np.arange(len(size)))
@@ -226,7 +228,7 @@ def _of_all_headings(mesh: Mesh, aim: Aim, _shot: Shot) -> Aim:
     return chosen
 
 
-def _best_of_fan(mesh: Mesh, aim: Aim, shot: Shot) -> Aim:
+def _best_of_fan(mesh: TriangleMesh, aim: Aim, shot: Shot) -> Aim:
     """Aim along the heading of a fan, and with the length, that comes nearest to the goal."""
     count = len(aim.steps)
     nearest = np.full(count, np.inf)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.mesh import CREASE, Mesh
+from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
 from dmpcli.surfaces.vectors import across, cross, dot, length, turned, unit
 
 _SHARP = np.cos(np.radians(CREASE))
@@ -85,7 +85,7 @@ class Marks:
 
 
 def start(
-    mesh: Mesh,
+    mesh: TriangleMesh,
     position: Floats,
     normal: Floats,
     direction: Floats,
@@ -116,7 +116,7 @@ def start(
 
 
 def _probe(
-    mesh: Mesh, points: Floats, normal: Floats, sign: Floats, part: Integers
+    mesh: TriangleMesh, points: Floats, normal: Floats, sign: Floats, part: Integers
 ) -> tuple[Floats, Booleans]:
     """Normals (M, 3) at the closest points, and whether (M, 1) the surface goes on there."""
     position, face = mesh.search(points)
@@ -126,7 +126,7 @@ def _probe(
     return there, good[:, None]
 
 
-def advance(mesh: Mesh, front: Front) -> tuple[Front, Marks]:
+def advance(mesh: TriangleMesh, front: Front) -> tuple[Front, Marks]:
     """Take one step of every walk."""
     x, t, n, h = front.position, front.direction, front.normal, front.step
     was_off = front.away > 0.0

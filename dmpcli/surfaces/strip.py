@@ -11,9 +11,9 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import stepping
-from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.nodes import Centre, Grid, Nodes, corners, walk_nodes
 from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import across, dot, length
 
 # Steps across the centre line are no longer than this, mm.
@@ -58,7 +58,7 @@ class Samples:
     slivers: Booleans
 
 
-def lift(mesh: Mesh, centre: Centre, u: Floats, v: Floats) -> Samples:
+def lift(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Samples:
     """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together."""
     B, T = u.shape
     foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
@@ -97,7 +97,7 @@ def _grids(u: Floats, v: Floats) -> Integers:
 
 
 def _lift_alike(
-    mesh: Mesh, centre: Centre, grid: Grid, cross_step: Floats, u: Floats, v: Floats
+    mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, u: Floats, v: Floats
 ) -> Samples:
     i, r = _cell(u / centre.step + grid.behind, grid.behind + grid.ahead)
     j, s = _cell(v / cross_step + grid.right, grid.right + grid.left)

@@ -13,7 +13,7 @@ from dmpcli.surfaces import all_headings
 from dmpcli.surfaces.vectors import dot, length
 
 if TYPE_CHECKING:
-    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 # Walls thinner than this, mm, are thin, and those thinner than so many times the distance of the
 # goal from them.
@@ -22,12 +22,14 @@ _THIN, _TIMES = 1.0, 4.0
 _AWAY = -0.9
 
 
-def mistaken(mesh: "Mesh", origin: Floats, goal: Floats, off: Floats, lengths: Floats) -> Booleans:
+def mistaken(
+    mesh: "TriangleMesh", origin: Floats, goal: Floats, off: Floats, lengths: Floats
+) -> Booleans:
     """Tell which goals are behind a thin wall, on whose near side a shorter line arrives.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : TriangleMesh
     origin, goal : array, shape (B, 3)
         On the mesh, mm.
     off : array, shape (B,)

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.protocol import Walks
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 from dmpcli.surfaces.vectors import across, cross, dot, turned, unit
 
 # More facets than this in one walk mean that it runs round and round.
 MOST_FACETS = 20_000
 
 
-def walk(mesh: Mesh, origin: Floats, direction: Floats, length: Floats) -> Walks:
+def walk(mesh: TriangleMesh, origin: Floats, direction: Floats, length: Floats) -> Walks:
     """Walk geodesics facet by facet, all walks in step; see `Surface.walk`.
 
     Where a walk meets a border, or an edge of three or more facets, it stops there and has not
@@ -53,7 +53,7 @@ class _State:
     face: Integers
 
 
-def _run(mesh: Mesh, state: _State, remaining: Floats) -> Booleans:
+def _run(mesh: TriangleMesh, state: _State, remaining: Floats) -> Booleans:
     """Walk the remaining lengths (M,) and tell which walks got there."""
     neighbours = mesh.topology.neighbours
     arrived = np.zeros(len(remaining), dtype=bool)
@@ -84,7 +84,7 @@ def _run(mesh: Mesh, state: _State, remaining: Floats) -> Booleans:
 
 
 def _exit(
-    mesh: Mesh, p: Floats, d: Floats, face: Integers, entry: Integers
+    mesh: TriangleMesh, p: Floats, d: Floats, face: Integers, entry: Integers
 ) -> tuple[Integers, Floats, Floats]:
     """Edge (M,) through which each walk leaves its facet, the way to it (M,), the edge's unit."""
     corners = mesh.corners[face]

@@ -8,7 +8,8 @@ from dmpcli.batch.job import Job, Settled, Task, settle
 from dmpcli.batch.run import Batch
 from dmpcli.errors import RefusedError
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.drawing import draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.records import record, streams

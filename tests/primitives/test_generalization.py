@@ -13,7 +13,8 @@ from dmpcli import rotations
 from dmpcli.measures.paper import GENERALIZATION
 from dmpcli.primitives.admission import admit, snapped
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, charts_of, draw
+from dmpcli.primitives.drawing import charts_of, draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs, curves, poses
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.retiming import timing

@@ -8,7 +8,8 @@ import pytest
 
 from dmpcli.measures.deviation import nearest_rms
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.drawing import draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.smoothing import Stroke

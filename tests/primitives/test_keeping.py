@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.drawing import draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.smoothing import Stroke

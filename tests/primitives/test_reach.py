@@ -3,7 +3,7 @@ import pytest
 
 from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, models
-from dmpcli.primitives.drawing import Stroke
+from dmpcli.primitives.drawn_strokes import Stroke
 from dmpcli.primitives.reach import Reach, attitude
 from dmpcli.primitives.retiming import Timing
 from dmpcli.primitives.wrench import Tool

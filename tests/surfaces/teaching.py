@@ -7,7 +7,8 @@ import numpy as np
 from dmpcli.measures.deviation import nearest_distance
 from dmpcli.measures.wave import wave_heights
 from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style, draw
+from dmpcli.primitives.drawing import draw
+from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.learning import fit
 from dmpcli.primitives.skill import TaughtSurface
