@@ -73,8 +73,8 @@ def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
     pairs = table.pairs
     with np.errstate(invalid="ignore"):  # rows that are not read hold what they held
         carried = Pairs(
-            pose.to_base(pairs.start),
-            pose.to_base(pairs.goal),
+            pose.apply(pairs.start),
+            pose.apply(pairs.goal),
             turned(pairs.start_rotation),
             turned(pairs.goal_rotation),
         )

@@ -62,6 +62,7 @@ def command(
     from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.records import mesh, pose, streams
     from dmpcli.records import touched as touched_file
+    from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.registration import LIMIT, Part
 
@@ -95,7 +96,7 @@ def command(
     )
     conditioning = result.conditioning
     content = pose.encode(
-        pose.Pose(result.position, result.rotation),
+        Pose(result.position, result.rotation),
         pose.Residuals(
             points=len(result.residual), rms=result.rms, largest=float(result.residual.max())
         ),

@@ -6,8 +6,9 @@ from dmpcli.errors import InputError, RefusedError
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
-    from dmpcli.records.pose import Pose, RunnerUp
+    from dmpcli.records.pose import RunnerUp
     from dmpcli.records.touched import Touched
+    from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.registration import Part, Registration, Rival
 
 _ALIKE = 4.0
@@ -37,7 +38,7 @@ def rough_pose(
     """
     import numpy as np
 
-    from dmpcli.records.pose import Pose
+    from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.registration import from_pairs
 
     paired = points.paired
@@ -59,7 +60,7 @@ def registered(
     points: "Touched", part: "Part", scale: float, start: "Pose | None", limit: float
 ) -> "Registration":
     """Find the pose: by pairs, about a start, or without one in all orientations."""
-    from dmpcli.surfaces.pose_search import joined
+    from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.registration import (
         from_pairs,
         onto_surface,
@@ -77,7 +78,7 @@ def registered(
     if not _beyond(*_moved(found, start, points.base)):
         return found
     # So far from its start a pose is no longer the one that was meant: all others are its rivals.
-    starts = joined(
+    starts = Pose.joined(
         starts_near(points.base, found.rotation, found.position),
         starts_anywhere(points.base, part),
     )
@@ -254,7 +255,7 @@ def _moved(result: "Registration", start: "Pose", touched: "Floats") -> tuple[fl
 
     centre = touched.mean(axis=0)
     in_part = (centre - result.position) @ result.rotation
-    moved = np.linalg.norm(start.to_base(in_part) - centre)
+    moved = np.linalg.norm(start.apply(in_part) - centre)
     turned = np.linalg.norm(rotations.log_one(result.rotation @ start.rotation.T))
     return float(moved), float(np.degrees(turned))
 

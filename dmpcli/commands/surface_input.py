@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.records.pose import Pose, PoseFile
+    from dmpcli.records.pose import PoseFile
     from dmpcli.records.streams import Source
+    from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.protocol import Surface
 
 

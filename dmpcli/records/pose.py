@@ -1,51 +1,24 @@
 """The pose file: where a part lies in the robot's base frame, as JSON; and six words for one."""
 
 import json
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dmpcli import __version__, rotations
-from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.records import documents, streams
 from dmpcli.records.documents import Part
 from dmpcli.records.schemas import EULER, FRAME
 from dmpcli.records.streams import Source
+from dmpcli.spatial.pose import Pose
 
 SCHEMA = "pose"
 VERSION = 1
 
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 Distance = Annotated[float, Field(ge=0)]
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where a part's own frame lies in the robot's base frame: x_base = R x_part + position.
-
-    Attributes
-    ----------
-    position : array, shape (3,)
-        mm.
-    rotation : array, shape (3, 3)
-        R.
-    """
-
-    position: Floats
-    rotation: Floats
-
-    @classmethod
-    def of(cls, six: Floats) -> "Pose":
-        """Return the pose of X Y Z (mm) RX RY RZ (X-Y-Z Euler angles, rad)."""
-        return cls(np.array(six[:3], dtype=float), rotations.from_euler(np.array(six[3:])))
-
-    def to_base(self, points: Floats) -> Floats:
-        """Carry points (..., 3) of the part, mm, into the base frame."""
-        moved: Floats = points @ self.rotation.T + self.position
-        return moved
 
 
 class Residuals(Part):

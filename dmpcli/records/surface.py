@@ -7,8 +7,8 @@ from typing import Any
 from dmpcli.errors import InputError
 from dmpcli.records import cylinder, documents, mesh, mesh_formats, plane, sphere
 from dmpcli.records.mesh import MeshFile
-from dmpcli.records.pose import Pose
 from dmpcli.records.streams import Source
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
@@ -75,7 +75,7 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
     """
     if source.content.lstrip()[:1] != b"{" or mesh_formats.is_gltf(source):
         found = mesh.decode(source, unit or "mm", "--surface-unit")
-        return found if pose is None else found._replace(V=pose.to_base(found.V))
+        return found if pose is None else found._replace(V=pose.apply(found.V))
     document = documents.json_document(source)
     name = kind_of(document)
     if name is None:
@@ -93,7 +93,7 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
 
 def _placed(exact: Exact, pose: Pose) -> Exact:
     if isinstance(exact, Plane):
-        return Plane(pose.to_base(exact.point), pose.rotation @ exact.normal)
+        return Plane(pose.apply(exact.point), pose.rotation @ exact.normal)
     if isinstance(exact, Cylinder):
-        return replace(exact, point=pose.to_base(exact.point), axis=pose.rotation @ exact.axis)
-    return replace(exact, centre=pose.to_base(exact.centre))
+        return replace(exact, point=pose.apply(exact.point), axis=pose.rotation @ exact.axis)
+    return replace(exact, centre=pose.apply(exact.centre))

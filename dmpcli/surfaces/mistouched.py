@@ -5,15 +5,16 @@ from scipy.optimize import least_squares
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.conditioning import radius_of
 from dmpcli.surfaces.pose_bound import LEAST_NOISE
-from dmpcli.surfaces.pose_search import Closest, Poses, signed
+from dmpcli.surfaces.pose_search import Closest, signed
 
 _OUTLIER = 6.0
 """Residuals beyond this many robust standard deviations are kept from dominating the pose."""
 
 
-def steadied(touched: Floats, closest: Closest, best: Poses) -> Poses:
+def steadied(touched: Floats, closest: Closest, best: Pose) -> Pose:
     """Return a pose that mistouched points do not dominate; the same where there are none.
 
     Parameters
@@ -21,7 +22,7 @@ def steadied(touched: Floats, closest: Closest, best: Poses) -> Poses:
     touched : array, shape (n, 3)
         Base frame, mm.
     closest : callable
-    best : Poses
+    best : Pose
         One, of least squares.
     """
     rotation, position = best.rotation[0], best.position[0]
@@ -67,7 +68,7 @@ def steadied(touched: Floats, closest: Closest, best: Poses) -> Poses:
         ).x
     # The touched points were moved onto the part: the part moves the other way.
     R = rotations.exp(-x[3:] / radius)
-    return Poses((R @ rotation)[None], (R @ (position - x[:3] - centre) + centre)[None])
+    return Pose((R @ (position - x[:3] - centre) + centre)[None], (R @ rotation)[None])
 
 
 def _left_jacobian(rotvec: Floats) -> Floats:

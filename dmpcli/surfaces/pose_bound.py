@@ -14,8 +14,9 @@ from scipy.special import fdtri
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.conditioning import Conditioning
-from dmpcli.surfaces.pose_search import Closest, Poses, descended
+from dmpcli.surfaces.pose_search import Closest, descended
 
 LIKELY, SURE = 0.95, 0.999
 """Confidence of the bound, and of a rival's refusal."""
@@ -43,16 +44,16 @@ def sure_rise(squares: float, spare: int) -> float:
     return float(6.0 * fdtri(6, spare, SURE) * variance(squares, spare))
 
 
-def displacement(of: Poses, one: Poses, extreme: Floats) -> Floats:
+def displacement(of: Pose, one: Pose, extreme: Floats) -> Floats:
     """Largest distance, mm, shape (B,), between points of the part in B poses and in one.
 
     Parameters
     ----------
-    of, one : Poses
+    of, one : Pose
     extreme : array, shape (m, 3)
         Points of the part that span its convex hull: one of them moves most.
     """
-    apart = of.to_base(extreme) - one.to_base(extreme)
+    apart = of.apply(extreme) - one.apply(extreme)
     return np.asarray(np.linalg.norm(apart, axis=2).max(axis=1))
 
 
@@ -89,11 +90,11 @@ def ellipsoid(
 def beside(
     touched: Floats,
     closest: Closest,
-    best: Poses,
+    best: Pose,
     conditioning: Conditioning,
     extreme: Floats,
     limit: float,
-) -> tuple[Poses, Floats]:
+) -> tuple[Pose, Floats]:
     """Find the best fits at some displacements from a pose, along each of six motions.
 
     Parameters
@@ -101,7 +102,7 @@ def beside(
     touched : array, shape (n, 3)
         Base frame, mm.
     closest : callable
-    best : Poses
+    best : Pose
         One.
     conditioning : Conditioning
         At it.
@@ -112,18 +113,18 @@ def beside(
 
     Returns
     -------
-    poses : Poses
+    poses : Pose
     squares : array
         Sums of squared distances, mm².
     """
     motions = np.concatenate([conditioning.motions, -conditioning.motions])
-    reach = np.linalg.norm(_moved(motions.T, best.to_base(extreme)[0], conditioning), axis=1)
+    reach = np.linalg.norm(_moved(motions.T, best.apply(extreme)[0], conditioning), axis=1)
     step = motions * (limit / np.maximum(reach.max(axis=0), 1e-12))[:, None]
     steps = np.concatenate([share * step for share in _TRIED])
     turn = rotations.exp(steps[:, 3:] / conditioning.radius)
     centre = conditioning.centre
     position = (turn @ (best.position[0] - centre)) + centre + steps[:, :3]
-    starts = Poses(turn @ best.rotation, position)
+    starts = Pose(position, turn @ best.rotation)
     return descended(touched, closest, starts, _STEPS, np.tile(motions, (len(_TRIED), 1)))
 
 

@@ -7,12 +7,12 @@ of Y. Chen, G. Medioni, Image and Vision Computing 10 (1992) 145), all starts as
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from dmpcli import rotations
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Floats, Integers
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.conditioning import radius_of
 
 Closest = Callable[[Floats], tuple[Floats, Floats]]
@@ -27,44 +27,6 @@ _SETTLED = 1e-9
 """A step that changes the sum of squares by less than this part of it is the last."""
 # Frequency of the super-Fibonacci spiral on SO(3): the root of psi^4 = psi + 4.
 _PSI = 1.533751168755204288118041
-
-
-@dataclass(frozen=True)
-class Poses:
-    """B poses of the part, x_base = R x_part + position.
-
-    Attributes
-    ----------
-    rotation : array, shape (B, 3, 3)
-    position : array, shape (B, 3)
-        mm.
-    """
-
-    rotation: Floats
-    position: Floats
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    def __getitem__(self, rows: "Integers | Booleans | slice") -> "Poses":
-        return Poses(self.rotation[rows], self.position[rows])
-
-    def to_part(self, points: Floats) -> Floats:
-        """Carry points (n, 3) of the base frame into the part's, shape (B, n, 3)."""
-        return np.asarray((points - self.position[:, None]) @ self.rotation)
-
-    def to_base(self, points: Floats) -> Floats:
-        """Carry points (n, 3) of the part into the base frame, shape (B, n, 3)."""
-        moved = points @ np.swapaxes(self.rotation, 1, 2) + self.position[:, None]
-        return np.asarray(moved)
-
-
-def joined(*poses: Poses) -> Poses:
-    """Return several arrays of poses as one."""
-    return Poses(
-        np.concatenate([some.rotation for some in poses]),
-        np.concatenate([some.position for some in poses]),
-    )
 
 
 def signed(points: Floats, closest: Closest) -> tuple[Floats, Floats]:
@@ -82,7 +44,7 @@ def signed(points: Floats, closest: Closest) -> tuple[Floats, Floats]:
 
 def near(
     rotation: Floats, position: Floats, about: Floats, count: int, shift: float, turn: float
-) -> Poses:
+) -> Pose:
     """Spread poses evenly about one: itself first, then others off by `shift` and `turn` at most.
 
     Parameters
@@ -105,10 +67,10 @@ def near(
     )
     R = rotations.exp(steps[:, 3:])
     moved = np.einsum("bij,j->bi", R, position - about) + about + steps[:, :3]
-    return Poses(R @ rotation, moved)
+    return Pose(moved, R @ rotation)
 
 
-def anywhere(centre: Floats, about: Floats, count: int) -> Poses:
+def anywhere(centre: Floats, about: Floats, count: int) -> Pose:
     """Spread poses over all orientations, each with a point of the part on one of the base frame.
 
     Super-Fibonacci spirals (M. Alexa, CVPR 2022).
@@ -126,10 +88,10 @@ def anywhere(centre: Floats, about: Floats, count: int) -> Poses:
     alpha, beta = 2.0 * np.pi * s / np.sqrt(2.0), 2.0 * np.pi * s / _PSI
     q = np.stack([r * np.sin(alpha), r * np.cos(alpha), big * np.sin(beta), big * np.cos(beta)], 1)
     R = rotations.from_quaternion(q)
-    return Poses(R, about - R @ centre)
+    return Pose(about - R @ centre, R)
 
 
-def descend(touched: Floats, closest: Closest, starts: Poses) -> tuple[Poses, Floats]:
+def descend(touched: Floats, closest: Closest, starts: Pose) -> tuple[Pose, Floats]:
     """Bring the starts to poses that fit the touched points best, each its own; best first.
 
     Parameters
@@ -137,17 +99,17 @@ def descend(touched: Floats, closest: Closest, starts: Poses) -> tuple[Poses, Fl
     touched : array, shape (n, 3)
         Base frame, mm.
     closest : callable
-    starts : Poses
+    starts : Pose
         B of them; the worst are given up on the way.
 
     Returns
     -------
-    poses : Poses
+    poses : Pose
     squares : array
         Sums of squared distances, mm².
     """
     poses, squares = descended(touched, closest, starts, _STEPS)
-    kept = _distinct(poses.to_part(touched), np.argsort(squares, kind="stable"))
+    kept = _distinct(poses.apply_inverse(touched), np.argsort(squares, kind="stable"))
     poses, squares = descended(touched, closest, poses[kept])
     order = np.argsort(squares, kind="stable")
     return poses[order], squares[order]
@@ -176,17 +138,17 @@ def _distinct(placed: Floats, order: Integers) -> Integers:
 def descended(
     touched: Floats,
     closest: Closest,
-    starts: Poses,
+    starts: Pose,
     steps: int = LAST_STEPS,
     fixed: Floats | None = None,
-) -> tuple[Poses, Floats]:
+) -> tuple[Pose, Floats]:
     """Take damped Gauss-Newton steps from every start, all at once.
 
     Parameters
     ----------
     touched : array, shape (n, 3)
     closest : callable
-    starts : Poses
+    starts : Pose
     steps : int
         At most.
     fixed : array, shape (B, 6), optional
@@ -194,14 +156,14 @@ def descended(
 
     Returns
     -------
-    poses : Poses
+    poses : Pose
     squares : array, shape (B,)
         Sums of squared distances, mm².
     """
     R, t = np.array(starts.rotation, dtype=float), np.array(starts.position, dtype=float)
     centre = touched.mean(axis=0)
     radius = radius_of(touched - centre)
-    distance, gradient = signed(Poses(R, t).to_part(touched), closest)
+    distance, gradient = signed(Pose(t, R).apply_inverse(touched), closest)
     squares = np.sum(distance**2, axis=1)
     damping = np.full(len(R), 1e-3)
     active = np.arange(len(R))
@@ -223,7 +185,7 @@ def descended(
         turn = rotations.exp(-step[:, 3:] / radius)
         R_new = turn @ R[active]
         t_new = np.einsum("bij,bj->bi", turn, t[active] - step[:, :3] - centre) + centre
-        d_new, g_new = signed(Poses(R_new, t_new).to_part(touched), closest)
+        d_new, g_new = signed(Pose(t_new, R_new).apply_inverse(touched), closest)
         s_new = np.sum(d_new**2, axis=1)
         better = s_new < squares[active]
         gain = (squares[active] - s_new) / np.maximum(squares[active], 1e-300)
@@ -238,7 +200,7 @@ def descended(
         active = active[~done]
         if len(active) == 0:
             break
-    return Poses(R, t), squares
+    return Pose(t, R), squares
 
 
 def _ball(cube: Floats) -> Floats:

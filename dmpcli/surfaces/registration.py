@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import pose_bound, pose_search
 from dmpcli.surfaces.conditioning import (
     Conditioning,
@@ -24,7 +25,7 @@ from dmpcli.surfaces.conditioning import (
     refuse_unseen,
 )
 from dmpcli.surfaces.mistouched import steadied
-from dmpcli.surfaces.pose_search import Closest, Poses
+from dmpcli.surfaces.pose_search import Closest
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.mesh import Mesh
@@ -212,13 +213,13 @@ def _extreme(V: Floats) -> Floats:
         return V
 
 
-def starts_near(touched: Floats, rotation: Floats, position: Floats) -> Poses:
+def starts_near(touched: Floats, rotation: Floats, position: Floats) -> Pose:
     """Return starts about a rough pose, itself the first."""
     centre = touched.mean(axis=0)
     return pose_search.near(rotation, position, centre, STARTS, START_SHIFT, START_TURN)
 
 
-def starts_anywhere(touched: Floats, part: Part) -> Poses:
+def starts_anywhere(touched: Floats, part: Part) -> Pose:
     """Return starts in all orientations, with the middle of the touched points in the part's."""
     middles = [
         part.places.mean(axis=0),
@@ -226,13 +227,13 @@ def starts_anywhere(touched: Floats, part: Part) -> Poses:
     ]
     about = touched.mean(axis=0)
     some = [pose_search.anywhere(middle, about, ORIENTATIONS) for middle in middles]
-    return pose_search.joined(*some)
+    return Pose.joined(*some)
 
 
 def onto_surface(
     touched: Floats,
     part: Part,
-    starts: Poses,
+    starts: Pose,
     approach: Floats | None = None,
     limit: float = LIMIT,
 ) -> Registration:
@@ -243,7 +244,7 @@ def onto_surface(
     touched : array, shape (n, 3)
         Base frame, mm.
     part : Part
-    starts : Poses
+    starts : Pose
         Of `starts_near` or `starts_anywhere`.
     approach : array, shape (n, 3), optional
         Unit directions in which the tip came to the points, base frame; NaN where not known.
@@ -274,11 +275,11 @@ def onto_surface(
     more = np.flatnonzero(fit <= squares[0] + pose_bound.sure_rise(squares[0], spare))
     if len(more):
         found, fit = pose_search.descended(touched, part.closest, tried[more])
-        poses, squares = pose_search.joined(poses, found), np.concatenate([squares, fit])
+        poses, squares = Pose.joined(poses, found), np.concatenate([squares, fit])
     cost, directed = _directed(touched, part, poses, squares, approach, limit)
     first = int(np.argmin(cost))
     best = steadied(touched, part.closest, poses[first : first + 1])
-    distance = pose_search.signed(best.to_part(touched), part.closest)[0][0]
+    distance = pose_search.signed(best.apply_inverse(touched), part.closest)[0][0]
     conditioning = _conditioning_at(touched, part, best)
     refuse_unseen(conditioning, "touch sides that face other ways too")
     least = float(np.sum(distance**2))
@@ -288,7 +289,7 @@ def onto_surface(
     # Another minimum within the limit is the same pose, less certain.
     same = (cost <= cost[first] + likely) & (apart <= limit)
     beside = pose_bound.displacement(tried[fit <= least + likely], best, part.extreme)
-    at = best.to_base(part.extreme)[0]
+    at = best.apply(part.extreme)[0]
     bound = max(
         pose_bound.ellipsoid(conditioning, count, least, spare, at),
         float(beside.max(initial=0.0)),
@@ -335,20 +336,20 @@ def _refuse_size(touched: Floats, part: Part) -> None:
         )
 
 
-def _beside(touched: Floats, part: Part, best: Poses, limit: float) -> tuple[Poses, Floats]:
+def _beside(touched: Floats, part: Part, best: Pose, limit: float) -> tuple[Pose, Floats]:
     conditioning = _conditioning_at(touched, part, best)
     return pose_bound.beside(touched, part.closest, best, conditioning, part.extreme, limit)
 
 
-def _conditioning_at(touched: Floats, part: Part, pose: Poses) -> Conditioning:
-    _, normal = part.closest(pose.to_part(touched)[0])
+def _conditioning_at(touched: Floats, part: Part, pose: Pose) -> Conditioning:
+    _, normal = part.closest(pose.apply_inverse(touched)[0])
     return conditioning_of(touched, normal @ pose.rotation[0].T, len(touched))
 
 
 def _directed(
     touched: Floats,
     part: Part,
-    poses: Poses,
+    poses: Pose,
     squares: Floats,
     approach: Floats | None,
     limit: float,
@@ -360,7 +361,7 @@ def _directed(
     """
     if approach is None:
         return squares, False
-    _, normal = part.closest(poses.to_part(touched).reshape(-1, 3))
+    _, normal = part.closest(poses.apply_inverse(touched).reshape(-1, 3))
     normal = normal.reshape(len(poses), -1, 3) @ np.swapaxes(poses.rotation, 1, 2)
     facing = np.sum(normal * approach, axis=2)
     astray = np.sum(facing > _FACING, axis=1)  # not where it is NaN
@@ -371,9 +372,9 @@ def _directed(
     return cost, True
 
 
-def _rival(part: Part, best: Poses, other: Poses, rms: float, near: bool) -> Rival:
-    places = best.to_base(part.places)[0]
-    off = np.abs(pose_search.signed(other.to_part(places), part.closest)[0][0])
+def _rival(part: Part, best: Pose, other: Pose, rms: float, near: bool) -> Rival:
+    places = best.apply(part.places)[0]
+    off = np.abs(pose_search.signed(other.apply_inverse(places), part.closest)[0][0])
     worst = int(np.argmax(off))
     apart = float(pose_bound.displacement(other, best, part.extreme)[0])
     turned = float(np.linalg.norm(rotations.log_one(other.rotation[0] @ best.rotation[0].T)))

@@ -12,8 +12,8 @@ from dmpcli import cli
 from dmpcli.commands import register_checks
 from dmpcli.errors import RefusedError
 from dmpcli.records import pose, streams, touched
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.pose_search import Poses
 from dmpcli.surfaces.registration import Part, onto_surface
 from tests.records.meshes import box, obj, written
 from tests.surfaces.registration_trial import touched_on, wedge
@@ -57,7 +57,7 @@ def found(folder, name="pose.json"):
 
 def assert_near(folder, atol):
     placed, _ = found(folder)
-    np.testing.assert_allclose(placed.to_base(V), V @ R.T + T, atol=atol)
+    np.testing.assert_allclose(placed.apply(V), V @ R.T + T, atol=atol)
 
 
 def test_point_pairs_give_the_pose(lab):
@@ -191,7 +191,7 @@ def wedge_lab(lab):
 def assert_wedge(folder):
     corners, _ = wedge()
     placed, file = found(folder)
-    error = np.linalg.norm(placed.to_base(corners) - (corners @ R.T + T), axis=1).max()
+    error = np.linalg.norm(placed.apply(corners) - (corners @ R.T + T), axis=1).max()
     assert error < 0.5
     assert error <= file.conditioning.uncertainty
 
@@ -222,8 +222,8 @@ def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedg
 def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(wedge_lab):
     points = touched.read(streams.read(wedge_lab / "on.csv"))
     part = Part.of(Mesh(*wedge()))
-    start = pose.Pose.of(np.array([446.0, -61.0, 18.0, 2.6, 1.3, -2.5]))
-    alone = Poses(start.rotation[None], start.position[None])
+    start = Pose.of(np.array([446.0, -61.0, 18.0, 2.6, 1.3, -2.5]))
+    alone = Pose(start.position[None], start.rotation[None])
     stuck = onto_surface(points.base, part, alone)
     with pytest.raises(RefusedError, match=r"on\.csv: the start is bad: --initial is ") as error:
         register_checks.refuse_unsure(stuck, points, part, start, 1.0, 1.5, True)

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.records import pose, surface
-from dmpcli.records.pose import Conditioning, Pose, Residuals
+from dmpcli.records.pose import Conditioning, Residuals
 from dmpcli.records.streams import Source
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.plane import Plane
 from tests.records.meshes import grid, obj
 
@@ -79,13 +80,13 @@ def test_six_numbers_and_a_file_say_the_same(tmp_path):
     said, source = pose.parse(words, "--surface-pose")
     assert source is None
     points = np.random.default_rng(0).standard_normal((5, 3))
-    np.testing.assert_allclose(said.to_base(points), expected(points), atol=1e-12)
+    np.testing.assert_allclose(said.apply(points), expected(points), atol=1e-12)
     file = tmp_path / "a pose.json"
     file.write_bytes(pose.encode(said))
     read, source = pose.parse(str(file), "--surface-pose")
     assert source is not None
     assert source.content == file.read_bytes()
-    np.testing.assert_allclose(read.to_base(points), expected(points), atol=1e-12)
+    np.testing.assert_allclose(read.apply(points), expected(points), atol=1e-12)
 
 
 @pytest.mark.parametrize("value", ["1 2 3", "1 2 3 4 5 6 7", "1 2 3 4 5 six", "1 2 3 4 5 nan"])

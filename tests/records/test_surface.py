@@ -8,8 +8,8 @@ import pytest
 from dmpcli import rotations
 from dmpcli.errors import InputError
 from dmpcli.records import cylinder, publish, sphere, surface
-from dmpcli.records.pose import Pose
 from dmpcli.records.streams import Source
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh, streams
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import pose_bound
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.pose_search import Poses
 from dmpcli.surfaces.registration import LIMIT, Part, onto_surface, starts_anywhere, starts_near
 
 PARTS = Path(__file__).parent / "parts"
@@ -104,7 +104,7 @@ def trial(V, F, part: Part, count, seed, sigma=0.1, anywhere=False) -> Outcome:
         found = onto_surface(points, part, starts)
     except InputError:
         return Outcome("free", np.nan, np.nan)
-    placed, true = Poses(found.rotation[None], found.position[None]), Poses(R[None], t[None])
+    placed, true = Pose(found.position[None], found.rotation[None]), Pose(t[None], R[None])
     error = float(pose_bound.displacement(placed, true, part.extreme)[0])
     if found.residual.max() > MOST_RESIDUAL:
         verdict = "residual"

@@ -1,0 +1,1 @@
+"""Tests of poses and trajectories."""
