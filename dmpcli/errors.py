@@ -3,6 +3,9 @@
 A message is one or two lines: what is wrong, where (file, column, row), what to do.
 """
 
+import contextlib
+from collections.abc import Iterator
+
 
 class DmpError(Exception):
     """Root of every error that a user can cause and mend; never shown as a traceback."""
@@ -31,3 +34,19 @@ class InstrumentError(DmpError):
 def counted(number: int, what: str) -> str:
     """Return a number of things in words: 1 pose, 2 poses."""
     return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+@contextlib.contextmanager
+def about(name: str, kind: type[DmpError] = DmpError) -> Iterator[None]:
+    """Put a file's name before the messages of errors that mathematics raises about it.
+
+    Parameters
+    ----------
+    name : str
+    kind : type of DmpError
+        Others are about something else, and pass as they are.
+    """
+    try:
+        yield
+    except kind as error:
+        raise type(error)(f"{name}: {error}") from None

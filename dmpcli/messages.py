@@ -30,6 +30,11 @@ def on_terminal(quiet: bool) -> None:
     LOG.setLevel(logging.WARNING if quiet else logging.INFO)
 
 
+def wanted() -> bool:
+    """Tell whether what a person may want to know is heard at all."""
+    return LOG.isEnabledFor(logging.INFO)
+
+
 def tell(message: str) -> None:
     """Say what a person may want to know."""
     LOG.info("%s", message)
@@ -50,7 +55,7 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
         Takes the number of steps done since the last call.
     """
     ours = any(isinstance(handler, Terminal) for handler in LOG.handlers)
-    if not (ours and LOG.isEnabledFor(logging.INFO) and sys.stderr.isatty()):
+    if not (ours and wanted() and sys.stderr.isatty()):
         yield lambda _: None
         return
     from rich.console import Console

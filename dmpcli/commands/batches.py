@@ -131,14 +131,14 @@ def write(
     provenance: "Provenance",
     output: Path,
     wanted: Wanted,
-    quiet: bool,
 ) -> None:
     """Draw the batch and say what became of it."""
     from dataclasses import replace
 
     from dmpcli.batch.job import Job
     from dmpcli.batch.run import Batch, Shard
-    from dmpcli.commands.messages import about, progress
+    from dmpcli.errors import about
+    from dmpcli.messages import progress
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.drawing import draw, seen_from
     from dmpcli.records import trajectory
@@ -160,9 +160,9 @@ def write(
     with about("skill"):
         # A skill that gives no stroke must not cost an older batch.
         draw(task.skill, pairs[first], duration[first], task.surface, task.style)
-    with progress("drawing", batch.count, quiet) as advance:
+    with progress("drawing", batch.count) as advance:
         summary = batch.run(draw_with, advance)
-    _tell(table, output, shard, summary, quiet)
+    _tell(table, output, shard, summary)
 
 
 def _workers(wanted: Wanted) -> "Draw":
@@ -180,11 +180,9 @@ def _workers(wanted: Wanted) -> "Draw":
     return workers.here
 
 
-def _tell(
-    table: "PairTable", output: Path, shard: "Shard", summary: "Summary", quiet: bool
-) -> None:
-    from dmpcli.commands.messages import tell, warn
+def _tell(table: "PairTable", output: Path, shard: "Shard", summary: "Summary") -> None:
     from dmpcli.commands.process_options import SLOW, SPLIT
+    from dmpcli.messages import tell, warn
     from dmpcli.records import streams
     from dmpcli.records.pairs import OK
 
@@ -196,21 +194,20 @@ def _tell(
     if summary.slow:
         warn(f"{output}: {counted(summary.slow, 'stroke')} {SLOW}")
     if summary.split:
-        tell(f"{output}: {counted(summary.split, 'stroke')} {SPLIT}", quiet)
+        tell(f"{output}: {counted(summary.split, 'stroke')} {SPLIT}")
     if summary.kept:
-        tell(f"{output}: {summary.kept} of {summary.parts} parts were there already", quiet)
+        tell(f"{output}: {summary.kept} of {summary.parts} parts were there already")
     bad = [status for status in table.status if status != OK]
     for status in bad[:SHOWN]:
-        tell(f"{table.name}: skipped: {status}", quiet)
+        tell(f"{table.name}: skipped: {status}")
     if len(bad) > SHOWN:
         more = f"{table.name}: and {len(bad) - SHOWN} more"
-        tell(f"{more}; {output}/{streams.TABLE} names all" if shard.whole else more, quiet)
+        tell(f"{more}; {output}/{streams.TABLE} names all" if shard.whole else more)
     if not shard.whole:
         tell(
             f"{output}: shard {shard.index}/{shard.count}: {counted(summary.drawn, 'stroke')} "
             f"drawn, {summary.failed} failed; once all shards are done, the same command without "
             "--shard writes the table and the manifest",
-            quiet,
         )
         return
     if len(bad) == len(table):
@@ -223,4 +220,4 @@ def _tell(
     if bad:
         warn(told)
     else:
-        tell(told, quiet)
+        tell(told)

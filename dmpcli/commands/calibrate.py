@@ -17,6 +17,7 @@ from dmpcli.commands.options import (
     Workspace,
 )
 from dmpcli.errors import InputError, RefusedError, counted
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.calibration.settings import CalibrateSettings
@@ -86,6 +87,7 @@ def command(
     The arm turns the tool about its tip, slowly and in all directions, and comes back; leave room
     for a tilt of 45° all around, or say less with --tilt.
     """
+    on_terminal(quiet)
     import math
 
     from dmpcli.calibration.settings import CalibrateSettings
@@ -112,9 +114,7 @@ def command(
     for name in (output, save):
         if name is not None:
             streams.check_writable(name)
-    request = Request(
-        output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force, quiet
-    )
+    request = Request(output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force)
     if from_file is None:
         _measure(settings, request)
     else:
@@ -134,7 +134,6 @@ class Request:
     realtime: bool
     allow_mixed: bool
     force: bool
-    quiet: bool
 
 
 def _from_file(settings: "CalibrateSettings", request: Request, name: str) -> None:
@@ -156,11 +155,11 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     from dmpcli.calibration import result
     from dmpcli.calibration.by_hand import Keyboard
     from dmpcli.calibration.tour import Interrupted
-    from dmpcli.commands.messages import tell, warn
     from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.instruments.interruption import Interruption
     from dmpcli.instruments.mock import PEN
+    from dmpcli.messages import tell, warn
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
 
@@ -179,7 +178,7 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     if keyboard is None:
         guards.check_streams(bench.robot)
     if bench.note:
-        tell(bench.note, request.quiet)
+        tell(bench.note)
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
     options = {"robot": urls.in_provenance(request.robot), "by_hand": request.by_hand}
@@ -187,7 +186,7 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     try:
         with Interruption() as interruption:
             info = bench.sensor.open()
-            _take(bench, info, clock, settings, request, interruption, keyboard, taken)
+            _take(bench, info, clock, settings, interruption, keyboard, taken)
     except Interrupted as stop:
         warn(str(stop))
         raise typer.Exit(128 + stop.number) from None
@@ -213,7 +212,6 @@ def _take(
     info: "SensorInfo",
     clock: "Clock",
     settings: "CalibrateSettings",
-    request: Request,
     interruption: "Interruption",
     keyboard: Any,
     taken: "list[StaticPose]",
@@ -221,9 +219,9 @@ def _take(
     """Fill `taken`, by the arm's own motion or as a person leads it."""
     from dmpcli.calibration.resting import Watcher
     from dmpcli.calibration.tour import Tour
-    from dmpcli.commands.messages import progress, tell
     from dmpcli.instruments.sensing import Sensing
     from dmpcli.instruments.watchdog import watched
+    from dmpcli.messages import progress, tell
     from dmpcli.streaming import session
     from dmpcli.streaming.loop import Arm
 
@@ -235,7 +233,7 @@ def _take(
     sensing.first(settings.settle)
     if keyboard is None:
         reach = session.reach_of(bench.robot, None, None)
-        with progress("poses", settings.poses, request.quiet) as step:
+        with progress("poses", settings.poses) as step:
             tour = Tour(arm, sensing, settings, interruption, taken, reach, lambda: step(1))
             tour.run()
         return
@@ -247,7 +245,7 @@ def _take(
         settings,
         interruption,
         taken,
-        lambda message: tell(message, request.quiet),
+        lambda message: tell(message),
     )
 
 
@@ -296,7 +294,7 @@ def _conclude(
 ) -> None:
     """Identify, say what came out, write the tool file."""
     from dmpcli.calibration import result
-    from dmpcli.commands.messages import tell
+    from dmpcli.messages import tell, wanted
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
 
@@ -311,10 +309,10 @@ def _conclude(
         request.output, tool_file.encode(result.with_payload(geometry, found), calibration)
     )
     for remark in remarks:
-        tell(remark, request.quiet)
-    if not request.quiet:
+        tell(remark)
+    if wanted():
         _show(found)
-    tell(f"{streams.shown(request.output, output=True)}: {result.verdict(found)}", request.quiet)
+    tell(f"{streams.shown(request.output, output=True)}: {result.verdict(found)}")
 
 
 def _show(found: "Identification") -> None:

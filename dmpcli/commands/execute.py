@@ -21,6 +21,7 @@ from dmpcli.commands.options import (
     Workspace,
 )
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.commands.keeping import Keeper
@@ -112,6 +113,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once."""
+    on_terminal(quiet)
     from dmpcli.records.settings import resolve
     from dmpcli.streaming.settings import ExecuteSettings
 
@@ -158,7 +160,6 @@ def command(
             realtime=realtime,
             allow_mixed=allow_mixed,
             force=force,
-            quiet=quiet,
         ),
     )
 
@@ -178,15 +179,14 @@ class Request:
     realtime: bool
     allow_mixed: bool
     force: bool
-    quiet: bool
 
 
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
     from dmpcli.commands.keeping import Keeper
-    from dmpcli.commands.messages import tell, warn
     from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.instruments.watchdog import watched
+    from dmpcli.messages import tell, warn
     from dmpcli.records import streams
     from dmpcli.streaming import many, session, stroke_file, verdict
     from dmpcli.streaming.loop import Arm
@@ -204,7 +204,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     clock = MonotonicClock() if realtime else SimulatedClock()
     keeper = None
     if request.output is not None:
-        keeper = Keeper(request.output, realtime, request.quiet)
+        keeper = Keeper(request.output, realtime)
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
@@ -220,7 +220,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         tool=held,
     )
     if bench.note:
-        tell(bench.note, request.quiet)
+        tell(bench.note)
     robot = watched(bench.robot) if realtime else bench.robot
     try:
         arm = Arm(robot, robot.open(), clock)
@@ -230,7 +230,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         reach = session.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(verdict.table(judged), request.quiet)
+            tell(verdict.table(judged))
         many.refuse_any(judged)
         if keeper is None:
             return
@@ -238,17 +238,17 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
         provenance.facts.update(session.facts_of(arm, coupling, settings))
-        outcome = _stream(loop, provenance, request, realtime, keeper)
+        outcome = _stream(loop, provenance, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
     if realtime:
-        tell(str(loop.pace), request.quiet)
+        tell(str(loop.pace))
     if loop.pressing is not None:
-        tell(session.pressed(loop.pressing), request.quiet)
+        tell(session.pressed(loop.pressing))
     stopped = closing or outcome.failure or outcome.signal
     if stopped and keeper.kept:
         name = streams.shown(keeper.output, output=True)
-        tell(f"{name}: {len(loop.log)} rows kept", request.quiet)
+        tell(f"{name}: {len(loop.log)} rows kept")
     if closing is not None and outcome.failure is None:
         raise closing
     left = many.rest_of(batch, loop.drawn) if many.lifts(batch, settings) else ""
@@ -257,7 +257,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
 
 def _warn_of(batch: "Batch", name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
     from dmpcli.records import marks
     from dmpcli.streaming import many
 
@@ -276,10 +276,10 @@ def _judged(
     request: Request,
 ) -> "list[Judged]":
     """Plan and check every stroke from where the arm stands."""
-    from dmpcli.commands.messages import progress
+    from dmpcli.messages import progress
     from dmpcli.streaming import many
 
-    with progress("checking", len(batch.found), request.quiet) as advance:
+    with progress("checking", len(batch.found)) as advance:
         return many.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
@@ -377,12 +377,10 @@ def _provenance(
     return Provenance("execute", options, tuple(inputs), facts)
 
 
-def _stream(
-    loop: "Loop", provenance: "Provenance", request: Request, realtime: bool, keeper: "Keeper"
-) -> "Outcome":
+def _stream(loop: "Loop", provenance: "Provenance", realtime: bool, keeper: "Keeper") -> "Outcome":
     """Run the loop and write what it logged, whatever ended it."""
-    from dmpcli.commands.messages import tell
     from dmpcli.instruments.interruption import Interruption
+    from dmpcli.messages import tell
     from dmpcli.records.schemas import RUN
     from dmpcli.streaming import session
     from dmpcli.streaming.loop import Outcome
@@ -391,7 +389,7 @@ def _stream(
     with Interruption() as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
-            tell("streaming; Ctrl-C decelerates, a second one stops at once", request.quiet)
+            tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
             outcome = loop.run(interruption)
         finally:
@@ -404,7 +402,7 @@ def _stream(
 
 def _end(outcome: "Outcome", request: Request, left: str) -> None:
     """Say how the run ended, with the exit code that it earns, and which strokes are left."""
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
 
     said = outcome.reason + (left and f"; {left}")
     if outcome.failure is not None:
@@ -412,4 +410,4 @@ def _end(outcome: "Outcome", request: Request, left: str) -> None:
     if outcome.signal is not None:
         warn(said)
         raise typer.Exit(128 + outcome.signal)
-    tell(f"{request.output}: {said}", request.quiet)
+    tell(f"{request.output}: {said}")

@@ -8,6 +8,7 @@ import typer
 from dmpcli.commands import recording_options
 from dmpcli.commands.options import SURFACES, Config, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.primitives.fit_result import Fit
@@ -104,9 +105,11 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Learn a skill from one or several demonstrations."""
+    on_terminal(quiet)
     from dmpcli.commands import surface_input
     from dmpcli.commands.fit_messages import cautions, summary
-    from dmpcli.commands.messages import about, tell, warn
+    from dmpcli.errors import about
+    from dmpcli.messages import tell, warn
     from dmpcli.primitives.learning import fit
     from dmpcli.primitives.skill import TaughtSurface
     from dmpcli.records import skill, streams
@@ -160,14 +163,14 @@ def command(
     if [str(path) for path in demonstrations].count(streams.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [streams.read(path) for path in demonstrations]
-    strokes = [recording_options.recording(source, form, quiet) for source in sources]
+    strokes = [recording_options.recording(source, form) for source in sources]
     options = settings.model_dump()
     if form is not None:
         options["layout"] = form.as_options()
     inputs = [{"role": "demonstration", "sha256": s.sha256} for s in sources]
     taught_on, taught = None, None
     if surface is not None:
-        named = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
+        named = surface_input.read(surface, surface_pose, surface_unit, summary=True)
         options |= named.options | {"surface_unit": named.unit}
         inputs += named.inputs
         taught_on, taught = named.surface, TaughtSurface(named.kind, named.facts)
@@ -182,7 +185,7 @@ def command(
             Provenance("fit", options, tuple(inputs)),
         ),
     )
-    tell(summary(streams.shown(output, output=True), names, result), quiet)
+    tell(summary(streams.shown(output, output=True), names, result))
     for line in cautions(names, result):
         warn(line)
 

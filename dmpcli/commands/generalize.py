@@ -17,6 +17,7 @@ from dmpcli.commands.process_options import (
     ToolSpeed,
 )
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.commands.surface_input import SurfaceInput
@@ -171,6 +172,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Draw a skill at new start and goal points."""
+    on_terminal(quiet)
     from dmpcli.batch.job import Task
     from dmpcli.commands import batches, process_options, single, surface_input
     from dmpcli.commands.generalize_inputs import (
@@ -181,7 +183,7 @@ def command(
         style_of,
     )
     from dmpcli.commands.generalize_messages import mark, tell_of_surface
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
     from dmpcli.records import lesson, streams
     from dmpcli.records import skill as skill_file
     from dmpcli.records.generalize_settings import GeneralizeSettings
@@ -244,10 +246,10 @@ def command(
     options = settings.asked(settings.model_dump())
     found = read = None
     if surface is not None:
-        read = surface_input.read(surface, surface_pose, surface_unit, quiet, summary=True)
+        read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
         options |= {"surface_unit": read.unit, "on_border": on_border} | read.options
         found, inputs = read.surface, inputs + read.inputs
-    reach = reach_of(robot_model, tool, learned.oriented, options, inputs, quiet)
+    reach = reach_of(robot_model, tool, learned.oriented, options, inputs)
     if pairs is None:
         assert start is not None
         assert goal is not None
@@ -265,9 +267,9 @@ def command(
     _check_asked(learned, table, settings)
     process_options.check_skill(settings, learned, table, keep_out)
     table = process_options.copied(table, settings)
-    given = None if found is None else facing_tool(found, learned, table, str(surface), quiet)
+    given = None if found is None else facing_tool(found, learned, table, str(surface))
     style = style_of(settings.style(), learned, given, settings.contact, settings.offset)
-    style = process_options.process_style(style, settings, leaving, given, keep_out, inputs, quiet)
+    style = process_options.process_style(style, settings, leaving, given, keep_out, inputs)
     said = mark(learned, streams.shown(skill))
     if said is not None:
         warn(said)
@@ -276,19 +278,18 @@ def command(
         tell(
             "the skill was taught on a surface: its tool turns as it did against that one, about "
             "the axes of the taught start; --orientation surface turns it with this one",
-            quiet,
         )
     if given is not None:
-        tell_of_surface(learned, style, given, table, str(surface), quiet)
+        tell_of_surface(learned, style, given, table, str(surface))
     _judge(learned, table, given, settings, style, wanted.stop, read, in_ == "part")
     taught = lesson.of_skill(file).facts()
     provenance = Provenance("generalize", options, tuple(inputs), taught)
     task = Task(learned, given, style, reach)
     lasting = _durations(learned, table, settings)
     if pairs is None:
-        single.write(task, table, lasting, provenance, output, quiet)
+        single.write(task, table, lasting, provenance, output)
     else:
-        batches.write(task, table, lasting, provenance, output, wanted, quiet)
+        batches.write(task, table, lasting, provenance, output, wanted)
 
 
 def _check_together(

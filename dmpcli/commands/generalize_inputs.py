@@ -95,11 +95,9 @@ def where_instead(
     return where
 
 
-def facing_tool(
-    surface: "Surface", skill: "Skill", table: "PairTable", name: str, quiet: bool
-) -> "Surface":
+def facing_tool(surface: "Surface", skill: "Skill", table: "PairTable", name: str) -> "Surface":
     """Turn a plane's normal to the tool's side, and say so where that flips it."""
-    from dmpcli.commands.messages import tell
+    from dmpcli.messages import tell
     from dmpcli.primitives.admission import tool_axis
     from dmpcli.surfaces.plane import Plane
 
@@ -107,7 +105,7 @@ def facing_tool(
         return surface  # other charts look for the tool's side at each start
     facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))
     if facing.normal @ surface.normal < 0:
-        tell(f"{name}: the normal is flipped: it must point to the tool's side", quiet)
+        tell(f"{name}: the normal is flipped: it must point to the tool's side")
     return facing
 
 
@@ -117,7 +115,6 @@ def reach_of(
     oriented: bool,
     options: dict[str, Any],
     inputs: list[dict[str, str]],
-    quiet: bool,
 ) -> "Reach | None":
     """Return the arm that is to draw; None where none is named.
 
@@ -126,8 +123,8 @@ def reach_of(
     InputError
         The model is not known, the tool file is wrong, or there is a tool and no arm.
     """
-    from dmpcli.commands.messages import tell
     from dmpcli.kinematics import models
+    from dmpcli.messages import tell
     from dmpcli.primitives.reach import Reach
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
@@ -142,10 +139,9 @@ def reach_of(
         tell(
             "the strokes have no orientation: the arm is checked with the tool along the surface's "
             "normal at the start",
-            quiet,
         )
     if tool is None:
-        tell("no --tool: the flange is taken as the TCP", quiet)
+        tell("no --tool: the flange is taken as the TCP")
         return Reach(arm)
     source = streams.read(tool)
     inputs.append({"role": "tool", "sha256": source.sha256})

@@ -84,18 +84,18 @@ def reason(
 
 
 def tell_of_surface(
-    skill: "Skill", style: "Style", given: "Surface", table: "PairTable", name: str, quiet: bool
+    skill: "Skill", style: "Style", given: "Surface", table: "PairTable", name: str
 ) -> None:
     """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over."""
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
     from dmpcli.primitives.sides import turned_over
 
     pairs = table.pairs[table.good.nonzero()[0]]
     start = pairs.start
     if skill.side_guessed:
-        _tell_of_guessed_side(skill, given, start, name, quiet)
+        _tell_of_guessed_side(skill, given, start, name)
     elif pairs.start_rotation is None:
-        _tell_of_taught_side(skill, given, start, name, quiet)
+        _tell_of_taught_side(skill, given, start, name)
     over = turned_over(skill, pairs, given)
     for heights, seen in ((style.heights, not over.all()), (style.heights_over, over.any())):
         if heights is None or not seen or heights.deep:
@@ -105,7 +105,6 @@ def tell_of_surface(
                 f"{name}: the stroke was taught {abs(heights.removed):.2f} mm "
                 f"{'off' if heights.removed > 0.0 else 'inside'} its surface, which is taken off; "
                 "--contact 0 draws it so",
-                quiet,
             )
         if heights.touching < 0.5:
             warn(
@@ -117,16 +116,13 @@ def tell_of_surface(
             tell(
                 f"{name}: lifted by up to {heights.lift:.2f} mm over "
                 f"{100.0 * (1.0 - heights.touching):.0f} % of the path, as taught",
-                quiet,
             )
 
 
-def _tell_of_guessed_side(
-    skill: "Skill", given: "Surface", start: "Floats", name: str, quiet: bool
-) -> None:
+def _tell_of_guessed_side(skill: "Skill", given: "Surface", start: "Floats", name: str) -> None:
     import numpy as np
 
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
     from dmpcli.primitives.sides import normals_at
 
     if not len(start):
@@ -142,20 +138,17 @@ def _tell_of_guessed_side(
         tell(
             f"{name}: the stroke was taught without orientation; it is seen from this surface's "
             "side",
-            quiet,
         )
 
 
-def _tell_of_taught_side(
-    skill: "Skill", given: "Surface", start: "Floats", name: str, quiet: bool
-) -> None:
+def _tell_of_taught_side(skill: "Skill", given: "Surface", start: "Floats", name: str) -> None:
     """Say where a curved surface is not decidedly, or not by its own normals, on the taught side.
 
     A part's own normals point out of it; those of an open sheet mean nothing.
     """
     import numpy as np
 
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
     from dmpcli.primitives.sides import taught_side
     from dmpcli.surfaces.plane import Plane
 
@@ -174,13 +167,12 @@ def _tell_of_taught_side(
             f"{name}: drawn on the side that the surface's own normals point away from, as the "
             "tool was when it was taught; for the other one give the tool at the start, "
             "--start X Y Z RX RY RZ",
-            quiet,
         )
 
 
 def tell_of_stretch(verdict: "Admission", rows: "Integers", skill: "Skill", table: str) -> None:
     """Warn of strokes whose start-goal distance is far from the demonstrated one."""
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
     from dmpcli.primitives.admission import LONG_STRETCH, nearly_closed
 
     stretch = verdict.stretch[rows]

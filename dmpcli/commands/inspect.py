@@ -29,8 +29,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
-    from dmpcli.commands.messages import tell
     from dmpcli.figures import inspection
+    from dmpcli.messages import tell
     from dmpcli.records import mesh, streams
 
     if schema is not None:

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from dmpcli.commands.messages import tell, warn
 from dmpcli.errors import DmpError, InputError, InstrumentError
+from dmpcli.messages import tell, warn
 
 if TYPE_CHECKING:
     from dmpcli.records.journal import Journal
@@ -21,7 +21,6 @@ class Keeper:
     ----------
     output : str
     realtime : bool
-    quiet : bool
 
     Attributes
     ----------
@@ -30,8 +29,8 @@ class Keeper:
         Whether the output is there.
     """
 
-    def __init__(self, output: str, realtime: bool, quiet: bool) -> None:
-        self.output, self._realtime, self._quiet = output, realtime, quiet
+    def __init__(self, output: str, realtime: bool) -> None:
+        self.output, self._realtime = output, realtime
         self._journal: Journal | None = None
         self.kept = False
 
@@ -71,7 +70,7 @@ class Keeper:
 
         path = journal.beside(self.output)
         if path is None:
-            tell(f"-o {self.output}: has no journal; a crash would lose the run", self._quiet)
+            tell(f"-o {self.output}: has no journal; a crash would lose the run")
             return
         self._journal = journal.Journal(path, rows, schema, provenance)
 

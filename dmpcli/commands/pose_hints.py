@@ -13,7 +13,7 @@ def warn_of_angles(option: str, angles: "Sequence[float]") -> None:
     """Doubt angles of more than a turn aloud."""
     import numpy as np
 
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
 
     if max(abs(angle) for angle in angles) <= _TURN:
         return

@@ -203,7 +203,6 @@ def process_style(
     surface: "Surface | None",
     keep_out: Path | None,
     inputs: list[dict[str, str]],
-    quiet: bool,
 ) -> "Style":
     """Return the style with what the process asks for.
 
@@ -222,7 +221,7 @@ def process_style(
             "it out, or name regions with --keep-out"
         )
     margin = _margin(settings.border_margin, surface)
-    regions = () if keep_out is None else _regions(keep_out, surface, settings, inputs, quiet)
+    regions = () if keep_out is None else _regions(keep_out, surface, settings, inputs)
     return replace(
         style,
         inclination=settings.inclination,
@@ -263,9 +262,8 @@ def _regions(
     surface: "Surface | None",
     settings: "GeneralizeSettings",
     inputs: list[dict[str, str]],
-    quiet: bool,
 ) -> "tuple[Region, ...]":
-    from dmpcli.commands.messages import tell
+    from dmpcli.messages import tell
     from dmpcli.records import lines, streams
     from dmpcli.surfaces.keep_out import enclosed
 
@@ -285,14 +283,14 @@ def _regions(
             found.append(enclosed(surface, hits.position))
         except InputError as error:
             raise InputError(f"{name} {error}") from None
-    tell(f"{source.name}: no stroke enters {counted(len(found), 'region')}", quiet)
+    tell(f"{source.name}: no stroke enters {counted(len(found), 'region')}")
     return tuple(found)
 
 
 def warn_of_speed(strokes: "Sequence[Stroke]", ids: "Sequence[str]", style: "Style") -> None:
     """Warn of strokes that hold the speed that was asked for on a small part of their path only."""
     from dmpcli.batch.job import is_slow
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
     from dmpcli.primitives.tool_speed import held
 
     for name, stroke in zip(ids, strokes, strict=True):
@@ -311,17 +309,15 @@ def tell_of_pieces(
     ids: "Sequence[str]",
     rate: float,
     split: bool,
-    quiet: bool,
 ) -> None:
     """Say what several strokes of one file are: copies, pieces, or both."""
-    from dmpcli.commands.messages import tell
+    from dmpcli.messages import tell
 
     if split:
-        tell(SPLIT, quiet)
+        tell(SPLIT)
     poses = sum(len(stroke.position) for stroke in strokes)
     shown = ids[0] if len(ids) == 1 else f"{ids[0]} to {ids[-1]}"
     tell(
         f"{said}{counted(len(strokes), 'stroke')} ({shown}), {counted(poses, 'pose')} at "
         f"{rate:g} Hz",
-        quiet,
     )

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.messages import tell, warn
 from dmpcli.commands.options import (
     AllowMixed,
     Config,
@@ -23,6 +22,7 @@ from dmpcli.commands.options import (
     Workspace,
 )
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal, tell, wanted, warn
 
 if TYPE_CHECKING:
     from dmpcli.drag.loop import Ending, Recorder
@@ -75,6 +75,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
+    on_terminal(quiet)
     from dmpcli.commands.keeping import Keeper
     from dmpcli.drag import enter, references, rehearsal
     from dmpcli.drag.loop import DEFECT, Ending, Recorder
@@ -113,12 +114,12 @@ def command(
     urls.need_tool(addresses[1], tool is not None)
     realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
-        tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)
+        tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light")
     check_output(output, repeatable, force)
     tool_source = streams.read(tool) if tool else None
     held = tool_file.decode(tool_source) if tool_source else None
     stroke = references.build(settings)
-    keeper = Keeper(output, realtime, quiet)
+    keeper = Keeper(output, realtime)
     keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
     bench = urls.connect(
@@ -130,7 +131,7 @@ def command(
         tool=held,
     )
     if bench.note:
-        tell(bench.note, quiet)
+        tell(bench.note)
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
     ending = Ending(DEFECT)
     options = {
@@ -159,7 +160,7 @@ def command(
         )
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         try:
-            with _status(realtime and not quiet):
+            with _status(realtime and wanted()):
                 ending = recorder.run()
         finally:
             if len(recorder.log):
@@ -169,8 +170,8 @@ def command(
     # What was refused before the first row is one line.
     if len(recorder.log) or ending.failure is None:
         if realtime:
-            tell(str(recorder.pace), quiet)
-        tell(_summary(output, recorder, ending), quiet)
+            tell(str(recorder.pace))
+        tell(_summary(output, recorder, ending))
     if ending.failure is not None:
         raise ending.failure
     if signals.number is not None:

@@ -99,24 +99,22 @@ def layout_of(
     return layouts.adapted(base, mapping or [], said)
 
 
-def recording(source: "Source", layout: "Layout | None", quiet: bool) -> "Stroke":
+def recording(source: "Source", layout: "Layout | None") -> "Stroke":
     """Read a recording, and say how it was read and what is doubtful about it."""
     from dmpcli.records import recordings
 
     found = recordings.read(source, layout)
-    announce(source.name, found, layout, quiet)
+    announce(source.name, found, layout)
     return found.stroke
 
 
-def announce(name: str, found: "Recording", layout: "Layout | None", quiet: bool) -> None:
+def announce(name: str, found: "Recording", layout: "Layout | None") -> None:
     """Say how a recording was read and what is doubtful about it."""
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
 
     if found.ours and layout is not None:
-        tell(
-            f"{name}: is dmpcli's own and tells its columns and units; options were not used", quiet
-        )
+        tell(f"{name}: is dmpcli's own and tells its columns and units; options were not used")
     for remark in found.told:
-        tell(f"{name}: {remark}", quiet)
+        tell(f"{name}: {remark}")
     for doubt in found.doubts:
         warn(f"{name}: {doubt}")

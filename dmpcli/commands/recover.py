@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.messages import tell
 from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError, counted
+from dmpcli.messages import on_terminal, tell
 
 if TYPE_CHECKING:
     from dmpcli.records.journal import Found
@@ -25,6 +25,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Make the file that a crash kept `record` or `execute` from writing."""
+    on_terminal(quiet)
     from dmpcli.records import journal as journals
     from dmpcli.records import record, streams
 
@@ -34,7 +35,7 @@ def command(
     found = journals.read(streams.read(journal, journal=True))
     whole = _record(found)
     streams.write(output, record.encode(whole))
-    tell(_summary(output, journal, found, whole), quiet)
+    tell(_summary(output, journal, found, whole))
 
 
 def _record(found: "Found") -> "Record":

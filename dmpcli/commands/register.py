@@ -7,6 +7,7 @@ import typer
 
 from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal
 
 LARGE = 100_000
 """Faces on which the search takes some seconds."""
@@ -57,9 +58,11 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Find where a part lies from points touched on it."""
+    on_terminal(quiet)
     from dmpcli.commands import register_checks
-    from dmpcli.commands.messages import about, tell
     from dmpcli.commands.pose_hints import warn_of_angles
+    from dmpcli.errors import about
+    from dmpcli.messages import tell
     from dmpcli.records import mesh, pose, streams
     from dmpcli.records import touched as touched_file
     from dmpcli.spatial.pose import Pose
@@ -71,7 +74,7 @@ def command(
     sources = {"part": streams.read(part), "touched": streams.read(touched)}
     waiting = mesh.waiting(sources["part"])
     if waiting is not None:
-        tell(waiting, quiet)
+        tell(waiting)
     found = mesh.decode(sources["part"], unit)
     points = touched_file.read(sources["touched"])
     rough = None
@@ -82,10 +85,10 @@ def command(
         if source is not None:
             sources["initial"] = source
     for remark in found.remarks:
-        tell(f"{part}: {remark}", quiet)
-    tell(f"{part}: {mesh.summary(found)}", quiet)
+        tell(f"{part}: {remark}")
+    tell(f"{part}: {mesh.summary(found)}")
     if len(found.F) > LARGE:
-        tell(f"{part}: the search on {len(found.F)} faces takes a while", quiet)
+        tell(f"{part}: the search on {len(found.F)} faces takes a while")
     part_shape = Part.of(Mesh(found.V, found.F))
     scale = mesh.UNITS[unit]
     with about(str(touched)):
@@ -114,7 +117,7 @@ def command(
         register_checks.runner_up(result),
     )
     streams.write(output, content)
-    register_checks.tell_of(result, points, str(output), first, quiet)
+    register_checks.tell_of(result, points, str(output), first)
 
 
 def _check(max_residual: float, max_error: float, guess: str, initial: str | None) -> None:

@@ -121,7 +121,7 @@ def refuse_unsure(
     ------
     RefusedError
     """
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
 
     against = (
         _residual(result, points, most_residual)
@@ -286,31 +286,27 @@ def runner_up(result: "Registration") -> "RunnerUp | None":
     )
 
 
-def tell_of(
-    result: "Registration", points: "Touched", output: str, start: "Pose | None", quiet: bool
-) -> None:
+def tell_of(result: "Registration", points: "Touched", output: str, start: "Pose | None") -> None:
     """Say how well a pose fits, how certain it is, and what comes next to it."""
     import numpy as np
 
-    from dmpcli.commands.messages import tell, warn
+    from dmpcli.messages import tell, warn
 
     conditioning = result.conditioning
     tell(
         f"{output}: {len(result.residual)} points, residual {result.rms:.4f} mm RMS, "
         f"{result.residual.max():.4f} mm at most; condition number {conditioning.number:.3g}",
-        quiet,
     )
     tell(
         f"certain to {result.uncertainty:.2g} mm at every point of the part (95 %); least certain: "
         f"the part {conditioning.weakest}",
-        quiet,
     )
     if points.paired.all():
         return
     if result.rival is None:
-        tell("no other pose was found", quiet)
+        tell("no other pose was found")
     else:
-        tell(f"the runner-up, {_away(result.rival)}: {_fits(result.rival)}", quiet)
+        tell(f"the runner-up, {_away(result.rival)}: {_fits(result.rival)}")
     if points.approach is not None and not result.directed:
         warn(
             f"{points.table.name}: the directions of approach point out of the part in every pose "
@@ -332,4 +328,4 @@ def tell_of(
                 "pose that was found; no other in all orientations fits as well"
             )
             return
-        tell(f"{moved:.1f} mm and {turned:.1f}° from the start", quiet)
+        tell(f"{moved:.1f} mm and {turned:.1f}° from the start")

@@ -10,6 +10,7 @@ import typer
 from dmpcli.commands import recording_options
 from dmpcli.commands.options import SURFACES, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
@@ -65,9 +66,10 @@ def command(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No messages.")] = False,
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
+    on_terminal(quiet)
     from dmpcli.commands import surface_input
-    from dmpcli.commands.messages import tell, warn
     from dmpcli.figures import document, many, strokes
+    from dmpcli.messages import tell, warn
     from dmpcli.records import streams
 
     if files.count("-") > 1:
@@ -90,38 +92,34 @@ def command(
     )
     ground = said = normal = read = None
     if surface is not None:
-        read = surface_input.read(surface, surface_pose, surface_unit, quiet)
+        read = surface_input.read(surface, surface_pose, surface_unit)
         ground, said, normal = _ground(read)
     labels = strokes.labels_of(files)
-    parts = [
-        _part(name, label, normal, form, quiet) for name, label in zip(files, labels, strict=True)
-    ]
+    parts = [_part(name, label, normal, form) for name, label in zip(files, labels, strict=True)]
     parts = _seen(parts, ground)
     if ground is not None:
-        parts = _placed(parts, ground, quiet)
+        parts = _placed(parts, ground)
     if read is not None:
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = many.Sight(document.reference_of(parts), ground, normal)
-        parts = _measured(parts, sight, tables, quiet)
+        parts = _measured(parts, sight, tables)
         report = document.document(parts, said)
         for line in document.warnings(report):
             warn(line)
         if output is not None:
             written = _write(output, report, parts, ground)
     if output is not None:
-        tell(f"{output}: wrote {', '.join(written)}", quiet)
+        tell(f"{output}: wrote {', '.join(written)}")
     if as_json:
         streams.say(document.as_json(report))
     else:
         streams.say(document.as_text(report, _width()).encode())
 
 
-def _part(
-    name: str, label: str, normal: "Floats | None", form: "Layout | None", quiet: bool
-) -> "Part":
+def _part(name: str, label: str, normal: "Floats | None", form: "Layout | None") -> "Part":
     """Read one input, whatever it is; how recordings are seen, all of them together tell."""
-    from dmpcli.commands.messages import about
+    from dmpcli.errors import about
     from dmpcli.figures.document import Part
     from dmpcli.figures.ranking import Pupil
     from dmpcli.figures.recorded import Recorded
@@ -129,7 +127,7 @@ def _part(
     from dmpcli.records import lesson, record, schemas, skill, streams
 
     if name != streams.DASH and Path(name).is_dir():
-        return _batch(Path(name), label, normal, quiet)
+        return _batch(Path(name), label, normal)
     source = streams.read(name)
     if source.content.lstrip()[:1] == b"{":
         learned, file = skill.decode(source)
@@ -138,7 +136,7 @@ def _part(
         return Part(label, source.sha256, skill.SCHEMA, pupil=pupil)
     found = record.decode(source) if record.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        recording = recording_options.recording(source, None if found else form, quiet)
+        recording = recording_options.recording(source, None if found else form)
         kind = "recording" if found is None else "demonstration"
         recorded = Recorded(recording, label, source.name, source.sha256, normal)
         if found is not None:
@@ -151,16 +149,17 @@ def _part(
     return Part(label, source.sha256, found.schema.name, strokes, run, states=states)
 
 
-def _batch(folder: Path, label: str, normal: "Floats | None", quiet: bool) -> "Part":
+def _batch(folder: Path, label: str, normal: "Floats | None") -> "Part":
     """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
-    from dmpcli.commands.messages import about, tell
+    from dmpcli.errors import about
     from dmpcli.figures.document import MOST_ROWS, Part
     from dmpcli.figures.strokes import pairs_of, strokes_of
+    from dmpcli.messages import tell
     from dmpcli.records import dataset, lesson, record, schemas, streams
 
     batch, odd = dataset.read(folder)
     for remark in odd:
-        tell(remark, quiet)
+        tell(remark)
     if len(batch) > MOST_ROWS:
         with about(str(folder)):
             drawn_by = lesson.of_facts(dataset.facts_of(batch))
@@ -194,7 +193,7 @@ def _seen(parts: "list[Part]", ground: "Ground | None") -> "list[Part]":
     """Let recordings be seen as the skills did that learned from them."""
     from dataclasses import replace
 
-    from dmpcli.commands.messages import about
+    from dmpcli.errors import about
     from dmpcli.figures.document import lesson_for
 
     pupils = [part.pupil for part in parts if part.pupil]
@@ -212,17 +211,17 @@ def _seen(parts: "list[Part]", ground: "Ground | None") -> "list[Part]":
     return done
 
 
-def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
+def _placed(parts: "list[Part]", ground: "Ground") -> "list[Part]":
     """Measure how every trajectory and run lies on the surface."""
     from dataclasses import replace
 
-    from dmpcli.commands.messages import progress
     from dmpcli.figures.document import reference_of
     from dmpcli.figures.footing import AT_ONCE, placed
+    from dmpcli.messages import progress
 
     reference = reference_of(parts)
     done = []
-    with progress("measuring", sum(len(part.strokes) for part in parts), quiet) as advance:
+    with progress("measuring", sum(len(part.strokes) for part in parts)) as advance:
         for part in parts:
             strokes = []
             for first in range(0, len(part.strokes), AT_ONCE):
@@ -236,8 +235,8 @@ def _placed(parts: "list[Part]", ground: "Ground", quiet: bool) -> "list[Part]":
 def _warn_of_ends(parts: "list[Part]", read: "SurfaceInput") -> None:
     """Say of strokes that were planned to begin or end off the surface where it is instead."""
     from dmpcli.commands import off_surface
-    from dmpcli.commands.messages import warn
     from dmpcli.figures.document import FAR
+    from dmpcli.messages import warn
 
     lines = []
     for stroke in (stroke for part in parts for stroke in part.strokes):
@@ -275,19 +274,17 @@ def _tables(output: Path | None, batches: bool) -> "Iterator[Tables | None]":
         yield Tables(waves, strokes[0] if strokes else None)
 
 
-def _measured(
-    parts: "list[Part]", sight: "Sight", tables: "Tables | None", quiet: bool
-) -> "list[Part]":
+def _measured(parts: "list[Part]", sight: "Sight", tables: "Tables | None") -> "list[Part]":
     """Measure large batches, and write down the wave heights of all strokes."""
     from dataclasses import replace
 
-    from dmpcli.commands.messages import progress
     from dmpcli.figures.batch import measure
     from dmpcli.figures.document import write_waves
+    from dmpcli.messages import progress
 
     done = []
     total = sum(len(part.batch) for part in parts if part.batch)
-    with progress("measuring", total, quiet) as advance:
+    with progress("measuring", total) as advance:
         for part in parts:
             if part.batch is None:
                 done.append(part)

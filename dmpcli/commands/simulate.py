@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.messages import tell, warn
 from dmpcli.commands.options import (
     SURFACES,
     Config,
@@ -17,6 +16,7 @@ from dmpcli.commands.options import (
     WaveHeight,
 )
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal, tell, warn
 
 if TYPE_CHECKING:
     from dmpcli.drag.settings import RecordSettings
@@ -97,6 +97,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C."""
+    on_terminal(quiet)
     import time
 
     from dmpcli.drag.loop import LONGEST_LOOKAHEAD
@@ -129,7 +130,7 @@ def command(
         streams.check_writable(drawn)
     setting, hand = _scene(settings, faults, tool, strokes, lookahead)
     if surface is not None:
-        setting = _on(surface, surface_pose, surface_unit, setting, quiet)
+        setting = _on(surface, surface_pose, surface_unit, setting)
     elif surface_pose is not None or surface_unit is not None:
         raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
     ports = Ports(sensor_port, http_port, tcp_port, robot_port, monitor_port)
@@ -137,12 +138,12 @@ def command(
         with Serving(VirtualLab(setting, hand), faults, host, ports, settings.seed) as serving:
             line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
             print(line, flush=True)  # noqa: T201
-            tell("serving; Ctrl-C ends it", quiet)
+            tell("serving; Ctrl-C ends it")
             while signals.number is None:
                 time.sleep(0.1)
         if drawn is not None and hand.track:
             streams.write(drawn, _track(hand, settings))
-        tell(f"strokes drawn by the hand: {hand.drawn}", quiet)
+        tell(f"strokes drawn by the hand: {hand.drawn}")
     raise typer.Exit(128 + signals.number)
 
 
@@ -189,16 +190,14 @@ def _weighed(path: Path) -> "Tool":
         ) from None
 
 
-def _on(
-    path: Path, pose: str | None, unit: str | None, setting: "Setting", quiet: bool
-) -> "Setting":
+def _on(path: Path, pose: str | None, unit: str | None, setting: "Setting") -> "Setting":
     """Put a surface in the place of the plate."""
     from dataclasses import replace
 
     from dmpcli.commands import surface_input
     from dmpcli.instruments.virtual.part import facing
 
-    shape = surface_input.read(path, pose, unit, quiet).surface
+    shape = surface_input.read(path, pose, unit).surface
     return replace(setting, ground=facing(shape, setting.position, setting.rotation[:, 2]))
 
 

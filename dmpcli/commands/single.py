@@ -17,7 +17,6 @@ def write(
     duration: Any,
     provenance: "Provenance",
     output: Path,
-    quiet: bool,
 ) -> None:
     """Draw the stroke, write it and say what became of it.
 
@@ -31,8 +30,9 @@ def write(
     import numpy as np
 
     from dmpcli.batch.job import settle
-    from dmpcli.commands.messages import about, tell, warn
     from dmpcli.commands.process_options import tell_of_pieces, warn_of_speed
+    from dmpcli.errors import about
+    from dmpcli.messages import tell, warn
     from dmpcli.primitives.admission import snapped
     from dmpcli.primitives.contact_heights import end_heights
     from dmpcli.primitives.copies import ends as own_ends
@@ -75,7 +75,6 @@ def write(
         )
         tell(
             f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface",
-            quiet,
         )
     if any(stroke.unfolded for stroke in strokes):
         warn("the stroke crosses a sharp crease, where no tool can follow the surface")
@@ -83,7 +82,7 @@ def write(
     said = f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
     split = any(stroke.cuts for stroke in drawn)
     if len(strokes) > 1 or split:
-        tell_of_pieces(said, strokes, ids, task.style.rate, split, quiet)
+        tell_of_pieces(said, strokes, ids, task.style.rate, split)
         return
     [stroke] = strokes
     if len(stroke.position) < len(drawn[0].position):
@@ -94,7 +93,6 @@ def write(
     tell(
         f"{said}{counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "
         f"{task.style.rate:g} Hz, ends {miss:.4f} mm from the goal",
-        quiet,
     )
 
 

@@ -78,9 +78,7 @@ def check_options(surface: Path | None, pose: str | None, unit: str | None) -> N
         raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
 
 
-def read(
-    path: Path, pose: str | None, unit: str | None, quiet: bool, summary: bool = False
-) -> SurfaceInput:
+def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) -> SurfaceInput:
     """Read a surface, place it in the base frame, and say what is odd about it.
 
     Parameters
@@ -91,8 +89,6 @@ def read(
         ``X Y Z RX RY RZ`` in mm and rad, or a pose file.
     unit : str, optional
         Of a mesh file's lengths; without it mm.
-    quiet : bool
-        Say nothing.
     summary : bool
         Also say how fine a mesh is: its facets bound every accuracy.
 
@@ -101,8 +97,8 @@ def read(
     InputError
         A file that cannot be read or is none of them, a wrong pose or unit; by name.
     """
-    from dmpcli.commands.messages import tell
     from dmpcli.commands.pose_hints import warn_of_angles
+    from dmpcli.messages import tell
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
     from dmpcli.records import streams
@@ -126,15 +122,15 @@ def read(
         warn_of_angles("--surface-pose" if pose_source is None else pose_source.name, said[3:])
     waiting = mesh_file.waiting(source)
     if waiting is not None:
-        tell(waiting, quiet)
+        tell(waiting)
     found = surface_file.load(source, unit, placed)
     shape: Surface
     if isinstance(found, MeshFile):
         for remark in found.remarks:
-            tell(f"{path}: {remark}", quiet)
+            tell(f"{path}: {remark}")
         kind, shape = surface_file.MESH, Mesh(found.V, found.F)
         if summary:
-            tell(f"{path}: {mesh_file.summary(found, shape)}", quiet)
+            tell(f"{path}: {mesh_file.summary(found, shape)}")
     else:
         kind, shape = surface_file.kind(found), found
     return SurfaceInput(
@@ -150,7 +146,7 @@ def _agreed(name: str, file: "PoseFile", part: "Source", unit: str | None) -> st
     InputError
         They contradict one another: the part would be drawn on in another size than it has there.
     """
-    from dmpcli.commands.messages import warn
+    from dmpcli.messages import warn
 
     if part.content.lstrip()[:1] == b"{":  # no mesh: always in mm
         return unit

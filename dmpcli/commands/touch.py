@@ -7,6 +7,7 @@ import typer
 
 from dmpcli.commands.options import Quiet, Realtime, Robot
 from dmpcli.errors import InputError, counted
+from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
@@ -45,11 +46,12 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Lead the tip to a point by pendant or hand; Enter takes it, at rest, and q ends."""
+    on_terminal(quiet)
     from dmpcli.calibration.by_hand import Keyboard
-    from dmpcli.commands.messages import tell
     from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.instruments.interruption import Interruption
+    from dmpcli.messages import tell
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
 
@@ -68,17 +70,17 @@ def command(
     geometry = None if tool is None else tool_file.geometry(streams.read(tool))
     bench = urls.connect(robot, None, clock, tool=geometry)
     if bench.note:
-        tell(bench.note, quiet)
+        tell(bench.note)
     try:
         with Interruption() as signals:
             bench.robot.open()
-            _take(bench.robot, clock, points, keyboard, every, count, signals, quiet)
+            _take(bench.robot, clock, points, keyboard, every, count, signals)
     finally:
         closing = guards.leave(bench.robot.close)
         points.close()
     if closing is not None:
         raise closing
-    _end(points, output, signals, quiet)
+    _end(points, output, signals)
 
 
 def _check(
@@ -120,16 +122,15 @@ def _take(
     every: float | None,
     count: int | None,
     signals: "Interruption",
-    quiet: bool,
 ) -> None:
     from dmpcli.calibration import touching
     from dmpcli.calibration.resting import Watcher
-    from dmpcli.commands.messages import tell
+    from dmpcli.messages import tell
 
     watcher = Watcher(robot, clock)
 
     def say(message: str) -> None:
-        tell(message, quiet)
+        tell(message)
 
     if keyboard is not None:
         touching.by_hand(watcher, keyboard, points, count, signals, say)
@@ -137,8 +138,8 @@ def _take(
         touching.in_time(watcher, clock, every, count, points, signals, say)
 
 
-def _end(points: "PointFile", output: str, signals: "Interruption", quiet: bool) -> None:
-    from dmpcli.commands.messages import tell, warn
+def _end(points: "PointFile", output: str, signals: "Interruption") -> None:
+    from dmpcli.messages import tell, warn
     from dmpcli.records import streams
     from dmpcli.records.points import PairFile
 
@@ -146,8 +147,8 @@ def _end(points: "PointFile", output: str, signals: "Interruption", quiet: bool)
         warn(f"pair {points.count // 2 + 1} has no goal: touch it, or remove the row")
     name = streams.shown(output, output=True)
     if points.count == 0:
-        tell(f"{name}: no point was taken, nothing written", quiet)
+        tell(f"{name}: no point was taken, nothing written")
     else:
-        tell(f"{name}: {counted(points.count, 'point')}", quiet)
+        tell(f"{name}: {counted(points.count, 'point')}")
     if signals.number is not None:
         raise typer.Exit(128 + signals.number)
