@@ -24,7 +24,6 @@ from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
-    from dmpcli.commands.keeping import Keeper
     from dmpcli.instruments.urls import Bench
     from dmpcli.primitives.coupling import Filter
     from dmpcli.primitives.reach import Reach
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from dmpcli.streaming.many import Judged
     from dmpcli.streaming.settings import ExecuteSettings
     from dmpcli.streaming.stroke_file import Batch
+    from dmpcli.workflows.keeping import Keeper
 
 
 def command(
@@ -182,7 +182,6 @@ class Request:
 
 
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
-    from dmpcli.commands.keeping import Keeper
     from dmpcli.instruments import guards, urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.instruments.watchdog import watched
@@ -190,6 +189,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     from dmpcli.records import streams
     from dmpcli.streaming import many, session, stroke_file, verdict
     from dmpcli.streaming.loop import Arm
+    from dmpcli.workflows.keeping import Keeper
 
     addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
     if request.sensor is not None:

@@ -106,8 +106,6 @@ def command(
 ) -> None:
     """Learn a skill from one or several demonstrations."""
     on_terminal(quiet)
-    from dmpcli.commands import surface_input
-    from dmpcli.commands.fit_messages import cautions, summary
     from dmpcli.errors import about
     from dmpcli.messages import tell, warn
     from dmpcli.primitives.learning import fit
@@ -116,6 +114,8 @@ def command(
     from dmpcli.records.fit_settings import FitSettings
     from dmpcli.records.record import Provenance
     from dmpcli.records.settings import resolve
+    from dmpcli.workflows import surface_input
+    from dmpcli.workflows.fit_messages import cautions, summary
 
     if forcing_scale is not None and model == "modified":
         raise InputError("--forcing-scale: belongs to --model original; leave it out")

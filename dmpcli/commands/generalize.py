@@ -1,7 +1,7 @@
 """``dmpcli generalize``: a skill and new start-goal pairs in, trajectories out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -16,16 +16,11 @@ from dmpcli.commands.process_options import (
     ToolAcceleration,
     ToolSpeed,
 )
-from dmpcli.errors import InputError, RefusedError
-from dmpcli.messages import on_terminal
+from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal, tell
 
 if TYPE_CHECKING:
-    from dmpcli.commands.surface_input import SurfaceInput
-    from dmpcli.primitives.drawn_strokes import Style
-    from dmpcli.primitives.skill import Skill
-    from dmpcli.records.generalize_settings import GeneralizeSettings
-    from dmpcli.records.pairs import PairTable
-    from dmpcli.surfaces.protocol import Surface
+    pass
 
 _PLACED = 100
 """Pairs off the surface that are told where it is instead."""
@@ -173,22 +168,15 @@ def command(
 ) -> None:
     """Draw a skill at new start and goal points."""
     on_terminal(quiet)
-    from dmpcli.batch.job import Task
-    from dmpcli.commands import batches, process_options, single, surface_input
-    from dmpcli.commands.generalize_inputs import (
-        facing_tool,
-        in_base,
-        one_pair,
-        reach_of,
-        style_of,
-    )
-    from dmpcli.commands.generalize_messages import mark, tell_of_surface
-    from dmpcli.messages import tell, warn
-    from dmpcli.records import lesson, streams
-    from dmpcli.records import skill as skill_file
+    from dmpcli.commands import batches as batch_options
+    from dmpcli.records import learned_skill, streams
+    from dmpcli.records import pairs as pair_file
     from dmpcli.records.generalize_settings import GeneralizeSettings
-    from dmpcli.records.record import Provenance
+    from dmpcli.records.record import encode
     from dmpcli.records.settings import resolve
+    from dmpcli.workflows import batches, process, single, surface_input
+    from dmpcli.workflows.generalize import Order, prepared
+    from dmpcli.workflows.generalize_inputs import one_pair
 
     settings = resolve(
         GeneralizeSettings,
@@ -217,7 +205,7 @@ def command(
         preset,
         config,
     )
-    wanted = batches.asked(
+    wanted = batch_options.asked(
         pairs, on_error, jobs, cluster, shard, pairs_per_part, float32, compression
     )
     _check_together(
@@ -229,67 +217,53 @@ def command(
             "--offset": offset,
         },
     )
-    leaving = process_options.leaving(on_border)
-    process_options.check(settings, orientation, surface, keep_out)
+    leaving = process.leaving(on_border)
+    process.check(settings, orientation, surface, keep_out)
     surface_input.check_options(surface, surface_pose, surface_unit)
-    _check_frame(in_, surface, reproduce)
+    frame = _frame(in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import nursery
 
         nursery.begin()
-    source = streams.read(skill)
-    learned, file = skill_file.decode(source)
+    learned = learned_skill.read(streams.read(skill))
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
-    inputs = [{"role": "skill", "sha256": source.sha256}]
-    options = settings.asked(settings.model_dump())
-    found = read = None
+    read = None
     if surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
-        options |= {"surface_unit": read.unit, "on_border": on_border} | read.options
-        found, inputs = read.surface, inputs + read.inputs
-    reach = reach_of(robot_model, tool, learned.oriented, options, inputs)
+    inputs: list[dict[str, str]] = []
     if pairs is None:
         assert start is not None
         assert goal is not None
         table = one_pair(start, goal, start_orientation, goal_orientation)
-        options |= {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
+        options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
-        from dmpcli.records import pairs as pair_file
-
-        pairs_source = streams.read(pairs)
-        table = pair_file.read(pairs_source)
-        inputs.append({"role": "pairs", "sha256": pairs_source.sha256})
-        options |= wanted.options
-    if in_ == "part":
-        table, options = in_base(table, read), options | {"in": in_}
-    _check_asked(learned, table, settings)
-    process_options.check_skill(settings, learned, table, keep_out)
-    table = process_options.copied(table, settings)
-    given = None if found is None else facing_tool(found, learned, table, str(surface))
-    style = style_of(settings.style(), learned, given, settings.contact, settings.offset)
-    style = process_options.process_style(style, settings, leaving, given, keep_out, inputs)
-    said = mark(learned, streams.shown(skill))
-    if said is not None:
-        warn(said)
-    keeps = settings.orientation == "keep" and settings.inclination is None
-    if learned.surface is not None and learned.oriented and keeps:
-        tell(
-            "the skill was taught on a surface: its tool turns as it did against that one, about "
-            "the axes of the taught start; --orientation surface turns it with this one",
+        source = streams.read(pairs)
+        table, options = pair_file.read(source), wanted.options
+        inputs.append({"role": "pairs", "sha256": source.sha256})
+    ready = prepared(
+        Order(
+            learned,
+            table,
+            settings,
+            read,
+            frame,
+            leaving,
+            keep_out,
+            robot_model,
+            tool,
+            wanted.stop,
+            options,
+            inputs,
         )
-    if given is not None:
-        tell_of_surface(learned, style, given, table, str(surface))
-    _judge(learned, table, given, settings, style, wanted.stop, read, in_ == "part")
-    taught = lesson.of_skill(file).facts()
-    provenance = Provenance("generalize", options, tuple(inputs), taught)
-    task = Task(learned, given, style, reach)
-    lasting = _durations(learned, table, settings)
+    )
     if pairs is None:
-        single.write(task, table, lasting, provenance, output)
+        drawn = single.draw_one(ready)
+        streams.write(output, encode(drawn.record))
+        tell(f"{streams.shown(output, output=True)}: {drawn.said}")
     else:
-        batches.write(task, table, lasting, provenance, output, wanted)
+        batches.write(ready, output, wanted)
 
 
 def _check_together(
@@ -309,21 +283,22 @@ def _check_together(
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
 
 
-def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
+def _frame(in_: str, surface: Path | None, reproduce: bool) -> 'Literal["base", "part"]':
     if in_ not in ("base", "part"):
         raise InputError(f"--in {in_}: must be base or part")
     if in_ == "part" and surface is None:
         raise InputError("--in part: the axes of which part? Name it with --surface")
     if in_ == "part" and reproduce:
         raise InputError("--reproduce takes the demonstrated ends, in the base; leave --in out")
+    return "part" if in_ == "part" else "base"
 
 
 def _check_destination(
     output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
 ) -> None:
-    from dmpcli.commands.options import within
     from dmpcli.records import record, streams
     from dmpcli.records.pairs import FARTHEST
+    from dmpcli.workflows.ranges import within
 
     if reproduce:
         if any(given is not None for given in (start, goal, pairs)):
@@ -347,75 +322,3 @@ def _check_destination(
         raise InputError(
             f"{output}: holds {foreign[0]}, which is not of dmpcli; choose another folder"
         )
-
-
-def _check_asked(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> None:
-    """Refuse what this skill cannot give, rather than pass over it."""
-    asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
-    if not skill.oriented and any(rotation is not None for rotation in asked):
-        raise InputError(
-            f"{table.name}: asks for tool orientations, but the skill was demonstrated without; "
-            "leave them out, or fit a demonstration that has them"
-        )
-    if skill.model == "original" and settings.orientation == "surface":
-        raise InputError("--orientation surface: the original DMP knows no surface; leave it out")
-    if skill.model == "original" and settings.amplitude == "scale":
-        raise InputError("--amplitude scale: the original DMP scales by eq. (7); leave it out")
-    if not skill.closed and (settings.scale != 1.0 or settings.turn != 0.0):
-        raise InputError(
-            "--scale and --turn: the size and heading of an open stroke are those of its start and "
-            "goal; leave them out"
-        )
-    if skill.closed and settings.amplitude == "scale":
-        raise InputError(
-            "--amplitude scale: a closed stroke has no start-goal distance to scale with; "
-            "leave it out, or give its size with --scale"
-        )
-
-
-def _judge(
-    skill: "Skill",
-    table: "PairTable",
-    given: "Surface | None",
-    settings: "GeneralizeSettings",
-    style: "Style",
-    stop: bool,
-    read: "SurfaceInput | None",
-    in_part: bool,
-) -> None:
-    """Write what stands against a pair into its status; with `stop` the first one ends all."""
-    import numpy as np
-
-    from dmpcli.commands.generalize_inputs import ENDS, where_instead
-    from dmpcli.commands.generalize_messages import reason, tell_of_stretch
-    from dmpcli.primitives.admission import admit
-
-    rows = np.flatnonzero(table.good)
-    verdict = admit(
-        skill,
-        table.pairs[rows],
-        _durations(skill, table, settings)[rows],
-        style,
-        given,
-        settings.snap_tol,
-    )
-    for i in np.flatnonzero(~verdict.admitted):
-        row = int(rows[i])
-        place = f"{table.place(row)}, pair {table.ids[row]}: " if table.name != ENDS else ""
-        # To place each of very many would take longer than to draw them.
-        few = int(np.count_nonzero(verdict.far[:i])) < _PLACED
-        where = where_instead(table, row, read, in_part) if read is not None and few else None
-        table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill, where)
-    bad = np.flatnonzero(~table.good)
-    if stop and len(bad):
-        shape = verdict.upright | verdict.deep | verdict.stretched
-        refused = bad[0] in rows[shape & ~verdict.far]
-        raise (RefusedError if refused else InputError)(f"{table.name}: {table.status[bad[0]]}")
-    tell_of_stretch(verdict, np.flatnonzero(verdict.admitted), skill, table.name)
-
-
-def _durations(skill: "Skill", table: "PairTable", settings: "GeneralizeSettings") -> Any:
-    import numpy as np
-
-    default = settings.duration or skill.duration
-    return np.where(np.isnan(table.duration), default, table.duration)

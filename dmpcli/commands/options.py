@@ -1,13 +1,9 @@
-"""Options that several commands have, and checks of values that need no settings model."""
+"""Options that several commands have."""
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from dmpcli.errors import InputError
 
 Point = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
@@ -61,18 +57,3 @@ SurfacePose = Annotated[
 SurfaceUnit = Annotated[
     str | None, typer.Option(help="Unit of a mesh file: mm (default), cm, m or in.")
 ]
-
-
-def within(option: str, values: Sequence[float], largest: float) -> None:
-    """Refuse NaN and infinity, which the option parser lets pass, and numbers beyond all sense.
-
-    Raises
-    ------
-    InputError
-        Names the option and the value.
-    """
-    for value in values:
-        if not math.isfinite(value):
-            raise InputError(f"{option}: {value} is not a finite number")
-        if abs(value) > largest:
-            raise InputError(f"{option}: {value:g} is beyond {largest:g}; check its unit")

@@ -76,7 +76,6 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     on_terminal(quiet)
-    from dmpcli.commands.keeping import Keeper
     from dmpcli.drag import enter, references, rehearsal
     from dmpcli.drag.loop import DEFECT, Ending, Recorder
     from dmpcli.drag.settings import RecordSettings, check
@@ -89,6 +88,7 @@ def command(
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
     from dmpcli.records.schemas import DEMONSTRATION
+    from dmpcli.workflows.keeping import Keeper
 
     given = {
         "drag": drag,

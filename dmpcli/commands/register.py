@@ -60,7 +60,6 @@ def command(
     """Find where a part lies from points touched on it."""
     on_terminal(quiet)
     from dmpcli.commands import register_checks
-    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.errors import about
     from dmpcli.messages import tell
     from dmpcli.records import mesh, pose, streams
@@ -68,6 +67,7 @@ def command(
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.registration import LIMIT, Part
+    from dmpcli.workflows.pose_hints import warn_of_angles
 
     _check(max_residual, max_error, guess, initial)
     streams.check_writable(output)

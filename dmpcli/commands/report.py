@@ -14,13 +14,13 @@ from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
-    from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.figures.batch import Tables
     from dmpcli.figures.document import Part
     from dmpcli.figures.footing import Ground
     from dmpcli.figures.many import Sight
     from dmpcli.figures.measured import Row
     from dmpcli.records.layouts import Layout
+    from dmpcli.workflows.surface_input import SurfaceInput
 
 _WIDTH = 80
 _SHOWN = 3
@@ -67,10 +67,10 @@ def command(
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     on_terminal(quiet)
-    from dmpcli.commands import surface_input
     from dmpcli.figures import document, many, strokes
     from dmpcli.messages import tell, warn
     from dmpcli.records import streams
+    from dmpcli.workflows import surface_input
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
@@ -234,9 +234,9 @@ def _placed(parts: "list[Part]", ground: "Ground") -> "list[Part]":
 
 def _warn_of_ends(parts: "list[Part]", read: "SurfaceInput") -> None:
     """Say of strokes that were planned to begin or end off the surface where it is instead."""
-    from dmpcli.commands import off_surface
     from dmpcli.figures.document import FAR
     from dmpcli.messages import warn
+    from dmpcli.workflows import off_surface
 
     lines = []
     for stroke in (stroke for part in parts for stroke in part.strokes):

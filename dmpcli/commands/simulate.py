@@ -194,8 +194,8 @@ def _on(path: Path, pose: str | None, unit: str | None, setting: "Setting") -> "
     """Put a surface in the place of the plate."""
     from dataclasses import replace
 
-    from dmpcli.commands import surface_input
     from dmpcli.instruments.virtual.part import facing
+    from dmpcli.workflows import surface_input
 
     shape = surface_input.read(path, pose, unit).surface
     return replace(setting, ground=facing(shape, setting.position, setting.rotation[:, 2]))

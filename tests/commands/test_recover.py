@@ -5,13 +5,13 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.commands.keeping import Keeper
 from dmpcli.drag import log
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.records import journal, record, schemas, streams
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.rows import Rows
+from dmpcli.workflows.keeping import Keeper
 from tests.drag.drag_fakes import rehearse
 
 KNOWN = Provenance("record", {"seed": 1}, (), {"simulated": True})

@@ -43,8 +43,8 @@ def reason(
     where : callable, optional
         Says of the ends that are off the surface where it is instead.
     """
-    from dmpcli.commands import off_surface
     from dmpcli.primitives.admission import MOST_SAMPLES
+    from dmpcli.workflows import off_surface
 
     if verdict.coincident[i]:
         return "start and goal are one point, and the stroke is open; set them apart"

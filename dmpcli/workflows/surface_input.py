@@ -97,7 +97,6 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
     InputError
         A file that cannot be read or is none of them, a wrong pose or unit; by name.
     """
-    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.messages import tell
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
@@ -105,6 +104,7 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
     from dmpcli.records import surface as surface_file
     from dmpcli.records.mesh import MeshFile
     from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.workflows.pose_hints import warn_of_angles
 
     source = streams.read(path)
     inputs = [{"role": "surface", "sha256": source.sha256}]

@@ -1,50 +1,53 @@
-"""How ``generalize`` draws one pair, its copies and pieces, into one file."""
+"""How ``generalize`` draws one pair, its copies and pieces, into one record."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
 
-from dmpcli.errors import RefusedError, counted
+import numpy as np
 
-if TYPE_CHECKING:
-    from dmpcli.batch.job import Task
-    from dmpcli.records.pairs import PairTable
-    from dmpcli.records.record import Provenance
+from dmpcli.batch.job import settle
+from dmpcli.errors import RefusedError, about, counted
+from dmpcli.messages import tell, warn
+from dmpcli.primitives.admission import snapped
+from dmpcli.primitives.contact_heights import end_heights
+from dmpcli.primitives.copies import ends as own_ends
+from dmpcli.primitives.drawing import draw, seen_from
+from dmpcli.records import trajectory
+from dmpcli.records.pairs import OK
+from dmpcli.records.record import Record
+from dmpcli.surfaces.protocol import LEAVES
+from dmpcli.workflows.generalize import Ready
+from dmpcli.workflows.process import pieces, warn_of_speed
 
 
-def write(
-    task: "Task",
-    table: "PairTable",
-    duration: Any,
-    provenance: "Provenance",
-    output: Path,
-) -> None:
-    """Draw the stroke, write it and say what became of it.
+@dataclass(frozen=True)
+class DrawnPair:
+    """One pair as drawn.
+
+    Attributes
+    ----------
+    record : Record
+        Its trajectory file.
+    said : str
+        What was drawn, in words.
+    """
+
+    record: Record
+    said: str
+
+
+def draw_one(ready: Ready) -> DrawnPair:
+    """Draw the stroke of one pair, with its copies and pieces, and tell what is doubtful.
 
     Raises
     ------
     RefusedError
         It cannot be drawn, or one of its copies cannot.
     """
-    from dataclasses import replace
-
-    import numpy as np
-
-    from dmpcli.batch.job import settle
-    from dmpcli.commands.process_options import tell_of_pieces, warn_of_speed
-    from dmpcli.errors import about
-    from dmpcli.messages import tell, warn
-    from dmpcli.primitives.admission import snapped
-    from dmpcli.primitives.contact_heights import end_heights
-    from dmpcli.primitives.copies import ends as own_ends
-    from dmpcli.primitives.drawing import draw, seen_from
-    from dmpcli.records import record, streams, trajectory
-    from dmpcli.records.pairs import OK
-    from dmpcli.surfaces.protocol import LEAVES
-
+    task, table = ready.task, ready.table
     given = task.surface
     pairs = table.pairs if given is None else snapped(table.pairs, given)
     with about("skill"):
-        drawn = draw(task.skill, pairs, duration, given, task.style)
+        drawn = draw(task.skill, pairs, ready.duration, given, task.style)
     settled = settle(task, table.ids, drawn)
     skipped = set()
     if task.style.on_border == "skip" and any(one.status == OK for one in settled):
@@ -60,39 +63,35 @@ def write(
     settled = [one for i, one in enumerate(settled) if i not in skipped]
     strokes = [stroke for one in settled for stroke in one.strokes]
     seen, heights = seen_from(task.skill, task.style, pairs, given)
-    facts = provenance.facts | trajectory.facts_of(seen, task.style, heights)
+    facts = ready.provenance.facts | trajectory.facts_of(seen, task.style, heights)
     start, goal = own_ends(task.skill, pairs, given, task.style.turn)
     if len(strokes) == len(table) == 1 and not drawn[0].cuts:
         facts |= trajectory.facts_of_stroke(strokes[0], task.style.rate, start[0], goal[0])
     else:
         facts |= trajectory.facts_of_several(strokes[0], task.style.rate)
     ids = [name for one in settled for name in one.ids]
-    done = trajectory.trajectory_record(ids, strokes, replace(provenance, facts=facts))
-    streams.write(output, record.encode(done))
+    record = trajectory.trajectory_record(ids, strokes, replace(ready.provenance, facts=facts))
     if given is not None:
         moved = np.linalg.norm(
             [pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2
         )
-        tell(
-            f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface",
-        )
+        tell(f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface")
     if any(stroke.unfolded for stroke in strokes):
         warn("the stroke crosses a sharp crease, where no tool can follow the surface")
     warn_of_speed(strokes, ids, task.style)
-    said = f"{streams.shown(output, output=True)}: {task.skill.model} DMP, "
+    rate, model = task.style.rate, task.skill.model
     split = any(stroke.cuts for stroke in drawn)
     if len(strokes) > 1 or split:
-        tell_of_pieces(said, strokes, ids, task.style.rate, split)
-        return
+        return DrawnPair(record, f"{model} DMP, {pieces(strokes, ids, rate, split)}")
     [stroke] = strokes
     if len(stroke.position) < len(drawn[0].position):
         warn(f"clipped at the border: {len(stroke.position)} of {len(drawn[0].position)} poses")
-    miss = np.linalg.norm(
-        stroke.position[-1] - stroke.above(goal[0], end_heights(seen, heights)[1])
-    )
-    tell(
-        f"{said}{counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "
-        f"{task.style.rate:g} Hz, ends {miss:.4f} mm from the goal",
+    above = stroke.above(goal[0], end_heights(seen, heights)[1])
+    miss = np.linalg.norm(stroke.position[-1] - above)
+    return DrawnPair(
+        record,
+        f"{model} DMP, {counted(len(stroke.position), 'pose')}, {stroke.timing.t[-1]:.3f} s at "
+        f"{rate:g} Hz, ends {miss:.4f} mm from the goal",
     )
 
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.commands.surface_input import SurfaceInput
     from dmpcli.primitives.contact_heights import ContactHeights
     from dmpcli.primitives.drawn_strokes import Style
     from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.skill import Skill
     from dmpcli.records.pairs import PairTable
     from dmpcli.surfaces.protocol import Surface
+    from dmpcli.workflows.surface_input import SurfaceInput
 
 Point = tuple[float, float, float]
 
@@ -28,10 +28,10 @@ def one_pair(
     import numpy as np
 
     from dmpcli import rotations
-    from dmpcli.commands.options import within
-    from dmpcli.commands.pose_hints import warn_of_angles
     from dmpcli.primitives.generalization import Pairs
     from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
+    from dmpcli.workflows.pose_hints import warn_of_angles
+    from dmpcli.workflows.ranges import within
 
     def rotation(name: str, angles: Point | None) -> Any:
         if angles is None:
@@ -85,7 +85,7 @@ def where_instead(
     table: "PairTable", row: int, read: "SurfaceInput", in_part: bool
 ) -> Callable[[list[str]], str]:
     """Return what says of ends of a pair that are off the surface where it is instead."""
-    from dmpcli.commands import off_surface
+    from dmpcli.workflows import off_surface
 
     def where(ends: list[str]) -> str:
         at = {"start": table.pairs.start[row], "goal": table.pairs.goal[row]}

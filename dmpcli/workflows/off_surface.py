@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
-    from dmpcli.commands.surface_input import SurfaceInput
+    from dmpcli.workflows.surface_input import SurfaceInput
 
 _NEAR = 1.0
 """Points within this many mm of the surface after all are taken for meant so."""

@@ -1,0 +1,1 @@
+"""What each subcommand does, as functions on values; the commands and the Python API call it."""

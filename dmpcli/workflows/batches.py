@@ -1,0 +1,137 @@
+"""How ``generalize`` draws a table of pairs: the run, and what it tells."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dmpcli.batch.job import Job
+from dmpcli.batch.run import Batch, Shard, Summary
+from dmpcli.batch.workers import Draw
+from dmpcli.errors import InputError, RefusedError, about, counted
+from dmpcli.messages import progress, tell, warn
+from dmpcli.primitives.admission import snapped
+from dmpcli.primitives.drawing import draw, seen_from
+from dmpcli.records import streams, trajectory
+from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.record import Form
+from dmpcli.workflows.generalize import Ready
+from dmpcli.workflows.process import SLOW, SPLIT
+
+SHOWN = 20
+"""Bad pairs that are named on the terminal; all are in the folder's table."""
+
+PAIRS_PER_PART = 2000
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the command line says of a batch.
+
+    Attributes
+    ----------
+    stop : bool
+        Whether a bad pair ends the batch, else it is skipped.
+    jobs : int
+    cluster : str or None
+    shard : tuple of int
+        Which share, from 1, of how many.
+    pairs_per_part : int
+    float32 : bool
+    compression : str
+    """
+
+    stop: bool = True
+    jobs: int = 1
+    cluster: str | None = None
+    shard: tuple[int, int] = (1, 1)
+    pairs_per_part: int = PAIRS_PER_PART
+    float32: bool = False
+    compression: str = "zstd"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that change the result; who draws, and in how many shares, does not."""
+        return {
+            "on_error": "stop" if self.stop else "skip",
+            "pairs_per_part": self.pairs_per_part,
+            "float32": self.float32,
+            "compression": self.compression,
+        }
+
+
+def write(ready: Ready, output: Path, wanted: Wanted) -> None:
+    """Draw the batch into a folder and say what became of it."""
+    task, table, duration = ready.task, ready.table, ready.duration
+    if not table.good.any():
+        raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
+    drawable = table.pairs[table.good.nonzero()[0]]
+    seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
+    facts = ready.provenance.facts | trajectory.facts_of(seen, task.style, heights)
+    facts |= {"rate": task.style.rate}
+    form = Form(wanted.float32, wanted.compression)
+    job = Job(task, wanted.stop, replace(ready.provenance, facts=facts), form, str(output))
+    pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
+    shard = Shard(*wanted.shard)
+    batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, shard)
+    draw_with = _workers(wanted)
+    first = table.good.nonzero()[0][:1]
+    with about("skill"):
+        # A skill that gives no stroke must not cost an older batch.
+        draw(task.skill, pairs[first], duration[first], task.surface, task.style)
+    with progress("drawing", batch.count) as advance:
+        summary = batch.run(draw_with, advance)
+    _tell(table, output, shard, summary)
+
+
+def _workers(wanted: Wanted) -> Draw:
+    from dmpcli.batch import workers
+
+    if wanted.cluster is not None:
+        from dmpcli.batch import cluster
+
+        return cluster.workers(wanted.cluster)
+    if wanted.jobs > 1:
+        return workers.processes(wanted.jobs)
+    from dmpcli.batch import memory
+
+    memory.keep()
+    return workers.here
+
+
+def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> None:
+
+    if summary.unfolded:
+        warn(
+            f"{counted(summary.unfolded, 'stroke')} across a sharp crease, where no tool can "
+            "follow the surface"
+        )
+    if summary.slow:
+        warn(f"{output}: {counted(summary.slow, 'stroke')} {SLOW}")
+    if summary.split:
+        tell(f"{output}: {counted(summary.split, 'stroke')} {SPLIT}")
+    if summary.kept:
+        tell(f"{output}: {summary.kept} of {summary.parts} parts were there already")
+    bad = [status for status in table.status if status != OK]
+    for status in bad[:SHOWN]:
+        tell(f"{table.name}: skipped: {status}")
+    if len(bad) > SHOWN:
+        more = f"{table.name}: and {len(bad) - SHOWN} more"
+        tell(f"{more}; {output}/{streams.TABLE} names all" if shard.whole else more)
+    if not shard.whole:
+        tell(
+            f"{output}: shard {shard.index}/{shard.count}: {counted(summary.drawn, 'stroke')} "
+            f"drawn, {summary.failed} failed; once all shards are done, the same command without "
+            "--shard writes the table and the manifest",
+        )
+        return
+    if len(bad) == len(table):
+        raise RefusedError(
+            f"{table.name}: no pair can be drawn, {output}/{streams.TABLE} says why of each; move "
+            "the pairs"
+        )
+    drawn = len(table) - len(bad)
+    told = f"{output}: {counted(drawn, 'stroke')} drawn, {counted(len(bad), 'pair')} skipped"
+    if bad:
+        warn(told)
+    else:
+        tell(told)

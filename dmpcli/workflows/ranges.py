@@ -1,0 +1,21 @@
+"""Checks of numbers that need no settings model."""
+
+import math
+from collections.abc import Sequence
+
+from dmpcli.errors import InputError
+
+
+def within(option: str, values: Sequence[float], largest: float) -> None:
+    """Refuse NaN and infinity, which the option parser lets pass, and numbers beyond all sense.
+
+    Raises
+    ------
+    InputError
+        Names the option and the value.
+    """
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{option}: {value} is not a finite number")
+        if abs(value) > largest:
+            raise InputError(f"{option}: {value:g} is beyond {largest:g}; check its unit")
