@@ -10,7 +10,7 @@ from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
 from dmpcli.calibration.settings import CalibrateSettings
-from dmpcli.errors import RefusedError
+from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments import guards
 from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.protocols import RobotState
@@ -118,9 +118,10 @@ class Tour:
             checks, joints = preflight.by_joints(plan, there, self._reach, joints)
             for check in checks:
                 if not check.passed:
+                    value = beside(check.value, check.limit, ".3g")
                     raise RefusedError(
                         f"the arm cannot turn the tool through all poses from here: "
-                        f"{check.quantity} {check.value:.3g} {check.unit} is over "
+                        f"{check.quantity} {value} {check.unit} is over "
                         f"{check.limit:.3g} {check.unit}; begin in another pose, or give a "
                         "smaller --tilt"
                     )

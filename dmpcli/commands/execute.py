@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.record import Provenance
     from dmpcli.records.streams import Source
-    from dmpcli.streaming.loop import Arm, Loop, Outcome
+    from dmpcli.streaming.loop import Arm
     from dmpcli.streaming.many import Judged
+    from dmpcli.streaming.plan_loop import Outcome, PlanLoop
     from dmpcli.streaming.settings import ExecuteSettings
     from dmpcli.streaming.stroke_file import Batch
 
@@ -318,7 +319,7 @@ def _loop(
     coupling: "Filter | None",
     tool_file: "Source | None",
     keeper: "Keeper",
-) -> "Loop":
+) -> "PlanLoop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     from dmpcli.instruments.protocols import PlanPlayer
     from dmpcli.streaming import session
@@ -378,7 +379,7 @@ def _provenance(
 
 
 def _stream(
-    loop: "Loop", provenance: "Provenance", request: Request, realtime: bool, keeper: "Keeper"
+    loop: "PlanLoop", provenance: "Provenance", request: Request, realtime: bool, keeper: "Keeper"
 ) -> "Outcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.commands.messages import tell

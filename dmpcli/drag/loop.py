@@ -1,26 +1,23 @@
 """The control loop of ``record``: sensor → compensation → admittance → servo, and the log.
 
-Deadlines are absolute. A controller that queues set-points goes on while a deadline is missed, and
-gets those that it is owed with the next one. The loop stops by itself where going on would not be
-safe: a silent or saturated sensor, a robot that is not ready, refuses a set-point, does not follow
-or leaves the workspace, a loop that is late. Whatever ends it, the arm is stopped and the log is
-there.
+It stops by itself where going on would not be safe: a silent or saturated sensor, a robot that is
+not ready, refuses a set-point, does not follow or leaves the workspace, a loop that is late.
 """
 
-import math
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmpcli.arrays import Floats
+from dmpcli.control.cycle import Arm, ControlLoop, Cycle, StoppedAtOnce, Watch
+from dmpcli.control.cycle import Pose as Led
 from dmpcli.drag.log import Log
 from dmpcli.drag.settings import RecordSettings
-from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
+from dmpcli.errors import DmpError, InputError
 from dmpcli.instruments import guards
-from dmpcli.instruments.guards import Trail
 from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.pace import Pace, undisturbed
 from dmpcli.instruments.protocols import (
     Clock,
     DragTeaching,
@@ -30,7 +27,6 @@ from dmpcli.instruments.protocols import (
     Servo,
     ServoInfo,
 )
-from dmpcli.instruments.rest import Rest
 from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives.admittance import Pose, brake, move
 from dmpcli.primitives.compensation import Compensation, LowPass, dead_band
@@ -70,7 +66,35 @@ class Ending:
         return replace(self, reason=str(failure), failure=failure)
 
 
-class Recorder:
+class HandForce:
+    """What the hand does: the newest wrench, compensated and filtered, past the dead-band.
+
+    Parameters
+    ----------
+    sensing : Sensing
+    tool : Tool
+        With its zero.
+    settings : RecordSettings
+    """
+
+    def __init__(self, sensing: Sensing, tool: Tool, settings: RecordSettings) -> None:
+        self._sensing, self._settings = sensing, settings
+        self._compensate = Compensation(tool)
+        self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
+        self._wrench = np.zeros(6)
+
+    def feel(self, state: RobotState, now: float) -> Floats | None:
+        """Take in the new samples; None when the newest is too old to be believed."""
+        s = self._settings
+        for sample in self._sensing.hear(now):
+            external = self._compensate(sample.wrench, state.rotation)
+            guards.check_wrench(external, s.max_force, s.max_torque)
+            felt = self._low_pass(external)
+            self._wrench = dead_band(felt, s.dead_band_force, s.dead_band_torque)
+        return self._wrench if self._sensing.fresh(now) else None
+
+
+class Recorder(ControlLoop):
     """One recording.
 
     Parameters
@@ -101,7 +125,6 @@ class Recorder:
     ----------
     log : Log
         It is there whatever goes wrong.
-    pace : Pace
     sensor_info : SensorInfo
         What the sensor said of itself, once `run` has opened it.
     """
@@ -121,17 +144,22 @@ class Recorder:
         hindrance: Callable[[], DmpError | None] = lambda: None,
         remark: Callable[[str], None] = lambda _: None,
     ) -> None:
+        watch = Watch(
+            settings.following_error,
+            settings.following_angle,
+            settings.max_force,
+            settings.max_torque,
+        )
+        led = settings.drag == "admittance"
+        super().__init__(settings.law.period, watch, settings.workspace, led, hindrance)
         self._robot, self._sensor, self._clock = robot, sensor, clock
         self._tool, self._settings = tool, settings
-        self._longest, self._asked_to_end, self._begin = longest, asked_to_end, begin
+        self._longest, self._asked_to_end, self._tell_begin = longest, asked_to_end, begin
         self._interruption = interruption or Interruption()
-        self._lead_in, self._hindrance, self._remark = lead_in, hindrance, remark
+        self._lead_in, self._remark = lead_in, remark
         self._law, self._bounds = settings.law, settings.bounds
-        self._period = self._law.period
-        self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
-        self._wrench = np.zeros(6)
-        self.log = Log(referred=settings.drag == "admittance")
-        self.pace = Pace()
+        self._ended = ""
+        self.log = Log(referred=led)
 
     def run(self) -> Ending:
         """Record until the end; the instruments are closed after.
@@ -153,10 +181,9 @@ class Recorder:
         closing = None
         guards.check_streams(self._robot)
         try:
-            servo, info = self._robot.open(), self._sensor.open()
-            self.sensor_info = info
-            self._check_rates(servo, info)
-            if self._settings.drag == "admittance" and servo.lookahead > LONGEST_LOOKAHEAD:
+            servo, self.sensor_info = self._robot.open(), self._sensor.open()
+            self._check_rates(servo, self.sensor_info)
+            if self._streams and servo.lookahead > LONGEST_LOOKAHEAD:
                 self._remark(
                     f"robot: lags by its look-ahead of {servo.lookahead:g} s, and above "
                     f"{LONGEST_LOOKAHEAD:g} s the drag swings to and fro; shorten lookahead"
@@ -164,7 +191,8 @@ class Recorder:
             self._sensor.start(self._settings.sensor_rate)
             state = self._robot.state()
             guards.check_state(state, self._settings.workspace)
-            ending = self._drag(state, servo, info)
+            self._take(Arm(self._robot, servo, self._clock), self._zeroed(state))
+            ending = self._ending(*self._run())
         finally:
             closing = guards.leave(self._robot.close, self._sensor.close)
         return ending.unless(closing)
@@ -180,125 +208,76 @@ class Recorder:
         if s.drag == "builtin" and not isinstance(self._robot, DragTeaching):
             raise InputError("--drag builtin: this robot has no drag teaching of its own")
 
-    def _drag(self, state: RobotState, servo: ServoInfo, info: SensorInfo) -> Ending:
+    def _zeroed(self, state: RobotState) -> "HandForce":
+        """Wait for samples at rest, for the zero; return what the loop feels with."""
         s = self._settings
-        self._sensing = Sensing(self._sensor, info, s.sensor_rate, self._period, self._clock)
-        tool = self._sensing.zeroed(self._tool, state.rotation, s.bias_time, s.tool_check)
-        self._compensate = Compensation(tool)
-        self._servo = servo
-        self._trail = Trail(servo, self._period, s.following_error, s.following_angle)
-        reason, failure, stopping = DEFECT, None, None
-        try:
-            with undisturbed():
-                reason = self._cycles()
-            failure = self._hindrance()
-        except (InstrumentError, RefusedError) as error:
-            reason, failure = str(error), error
-        finally:
-            # Also on a defect of ours: nothing may leave the arm moving.
-            stopping = guards.leave(self._robot.stop)
-        return Ending(reason, failure).unless(stopping)
+        sensing = Sensing(self._sensor, self.sensor_info, s.sensor_rate, self._period, self._clock)
+        tool = sensing.zeroed(self._tool, state.rotation, s.bias_time, s.tool_check)
+        self._sensing, self._hand = sensing, HandForce(sensing, tool, s)
+        return self._hand
 
-    def _cycles(self) -> str:
-        """Run the loop to its end and the tool to rest; return why it ended."""
-        before = "before anything moved"
-        if self._interruption.count > 0:
-            return self._signalled(before)
-        home = reference = self._started()
+    def _ending(self, how: str, failure: DmpError | None) -> Ending:
+        if failure is not None:
+            return Ending(str(failure), failure)
+        number = self._interruption.number
+        if number is None:
+            return Ending(self._ended)
+        return Ending(f"{signal.Signals(number).name}: {how or 'stopped after braking to rest'}")
+
+    def _enter(self) -> None:
+        """Hand the arm over to its own drag teaching, or lead it from where it is then."""
+        self._heed()
+        if isinstance(self._robot, DragTeaching) and not self._streams:
+            self._robot.drag()
+            self._reference = self._home = None
+        else:
+            self._robot.start(self._period)
+            # Not before: it may have been moved since, and arms sink as their brakes are released.
+            state = self._robot.state()
+            guards.check_state(state, self._workspace)
+            self._reference = self._home = Pose(state.position, state.rotation, np.zeros(6))
         # Servos may take seconds to come on: what was felt meanwhile is past, but it is checked.
         self._sensing.hear(self._clock.now())
-        if self._interruption.count > 0:
-            return self._signalled(before)
-        start = self._start = self._clock.now()
-        self._cycle = self._missed = 0
-        self._last = start - self._period
-        self._begin(start)
-        while True:
-            due, woke = start + self._cycle * self._period, self._clock.now()
-            state = self._checked_state(reference)
-            fresh = self._feel(self._clock.now(), state)
-            if reference is not None and home is not None:
-                reference = self._lead(reference, home if fresh else None)
-            sent = self._clock.now()
-            t = state.t - start - self._lead_in
-            # Where the robot has told nothing new since the last cycle there is no new row.
-            if t > -0.5 * self._period and not (len(self.log) and round(t, 9) <= self.log.duration):
-                self.log.add(t, state, reference, self._wrench, self._sensing.newest)
-            reason = self._reason_to_end(t)
-            if reason is not None:
-                rested = self._come_to_rest(reference)
-                return self._signalled(rested) if self._interruption.count else reason
-            self.pace.add(due, woke, sent, self._clock.now())
-            self._wait()
+        self._heed()
+        self._tell_begin(self._clock.now())
 
-    def _started(self) -> Pose | None:
-        """Enter servo mode; return where the tool is then, or None where no reference leads it."""
-        if self._settings.drag == "builtin" and isinstance(self._robot, DragTeaching):
-            self._robot.drag()
-            return None
-        self._robot.start(self._period)
-        # Not before: it may have been moved since, and arms sink as their brakes are released.
-        state = self._robot.state()
-        guards.check_state(state, self._settings.workspace)
-        return Pose(state.position, state.rotation, np.zeros(6))
+    def _next(self, cycle: Cycle, owed: bool = False) -> Led:  # noqa: ARG002
+        """Move the reference by one period; it brakes at the end, and where nothing is felt."""
+        if self._ended and self._interruption.count > 1:
+            raise StoppedAtOnce("stopped at once at the second signal")
+        if self._reference is None or self._home is None:
+            return cycle.state.position, cycle.state.rotation
+        if cycle.wrench is None or self._ended:
+            reference = brake(self._law, self._reference, self._bounds)
+        else:
+            reference = move(self._law, self._reference, cycle.wrench, self._home, self._bounds)
+        self._reference = reference
+        guards.check_setpoint(reference.position, reference.rotation, self._workspace)
+        return reference.position, reference.rotation
 
-    def _wait(self) -> None:
-        """Sleep until the next deadline; those that have passed by now are missed."""
-        since = self._clock.now() - self._start
-        following = math.ceil(since / self._period - 1e-6)
-        self._missed = max(following - self._cycle - 1, 0)
-        self.pace.missed += self._missed
-        self._cycle += 1 + self._missed
-        self._clock.sleep_until(self._start + self._cycle * self._period)
+    def _record(self, cycle: Cycle, setpoint: Led | None, lateness: float | None) -> None:  # noqa: ARG002
+        if self._ended or lateness is None:
+            return
+        t = self._age(cycle.state)
+        # Where the robot has told nothing new since the last cycle there is no new row.
+        if t > -0.5 * self._period and not (len(self.log) and round(t, 9) <= self.log.duration):
+            wrench = np.zeros(6) if cycle.wrench is None else cycle.wrench
+            self.log.add(t, cycle.state, self._reference, wrench, self._sensing.newest)
 
-    def _lead(self, reference: Pose, home: Pose | None) -> Pose:
-        """Send the next set-point, and before it those that a queue is owed; return it.
+    def _age(self, state: RobotState) -> float:
+        """Return how old the recording is, s; negative while the hand takes hold."""
+        return state.t - self._begin - self._lead_in
 
-        Each is a step of one period; without `home`, from which the spring pulls, it brakes.
-        """
-        for _ in range(1 + (self._missed if self._servo.queues else 0)):
-            if home is None:
-                reference = brake(self._law, reference, self._bounds)
-            else:
-                reference = move(self._law, reference, self._wrench, home, self._bounds)
-            self._send(reference)
-        return reference
+    def _goes_on(self, cycle: Cycle) -> bool:
+        """Go on until there is a reason to end, and then until the arm rests."""
+        if not self._ended:
+            self._ended = self._reason_to_end(self._age(cycle.state))
+            # Nothing leads an arm that is dragged by its own teaching: it has only to be stopped.
+            return not self._ended or self._reference is not None
+        assert self._reference is not None
+        return bool(self._reference.velocity.any()) or not self._rest.reached(cycle.state)
 
-    def _checked_state(self, reference: Pose | None) -> RobotState:
-        """Read the arm's state at the head of a cycle; raise where it must not go on."""
-        now = self._clock.now()
-        state = self._robot.state()
-        guards.check_state(state, self._settings.workspace)
-        if reference is not None:
-            # Whether it slept too long or computed too long: the arm got nothing meanwhile.
-            guards.check_late(now - self._last - self._period, self._servo, self._period)
-            self._trail.check(state)
-        self._last = now
-        return state
-
-    def _feel(self, now: float, state: RobotState) -> bool:
-        """Take in the new samples; False when the newest is too old to be believed."""
-        s = self._settings
-        for sample in self._sensing.hear(now):
-            external = self._compensate(sample.wrench, state.rotation)
-            guards.check_wrench(external, s.max_force, s.max_torque)
-            felt = self._low_pass(external)
-            self._wrench = dead_band(felt, s.dead_band_force, s.dead_band_torque)
-        fresh = self._sensing.fresh(now)
-        if not fresh:
-            self._wrench = np.zeros(6)
-        return fresh
-
-    def _send(self, reference: Pose) -> None:
-        position, rotation = reference.position, reference.rotation
-        guards.check_setpoint(position, rotation, self._settings.workspace)
-        if not self._robot.send(position, rotation):
-            # The mode says why, where it can.
-            guards.check_state(self._robot.state())
-            raise InstrumentError("robot: refused a set-point, stopped; see its pendant")
-        self._trail.add(position, rotation)
-
-    def _reason_to_end(self, t: float) -> str | None:
+    def _reason_to_end(self, t: float) -> str:
         hindrance = self._hindrance()
         if hindrance is not None:
             return str(hindrance)
@@ -307,29 +286,6 @@ class Recorder:
         if t >= self._longest - 0.5 * self._period:
             return "duration"
         rest = self._settings.until_rest
-        if (
-            rest is not None
-            and len(self.log)
-            and self.log.moved(MOVED)
-            and self.log.still(rest, STILL)
-        ):
+        if rest is not None and self.log.moved(MOVED) and self.log.still(rest, STILL):
             return "rest"
-        return None
-
-    def _signalled(self, how: str) -> str:
-        number = self._interruption.number
-        return f"{signal.Signals(number).name if number else 'signal'}: stopped {how}"
-
-    def _come_to_rest(self, reference: Pose | None) -> str:
-        """Brake within the bounds, and wait for the arm; a second signal stops at once."""
-        rest = Rest(self._servo, self._period)
-        while reference is not None:
-            self._wait()
-            if self._interruption.count > 1:
-                return "at once at the second signal"
-            state = self._checked_state(reference)
-            self._feel(self._clock.now(), state)
-            reference = self._lead(reference, None)
-            if not reference.velocity.any() and rest.reached(state):
-                break
-        return "after braking to rest"
+        return ""

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError, InstrumentError, RefusedError
+from dmpcli.errors import InputError, InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
 
 Box = tuple[float, float, float, float, float, float]
@@ -123,8 +123,9 @@ def check_inside(position: Floats, box: Box | None, what: str) -> None:
         return
     for axis, value, low, high in zip("xyz", position.tolist(), box[::2], box[1::2], strict=True):
         if not low <= value <= high:
+            text = beside(value, low if value < low else high, ".3f")
             raise RefusedError(
-                f"{what} at {axis} = {value:.3f} mm leaves the workspace ({low:g} to {high:g} mm)"
+                f"{what} at {axis} = {text} mm leaves the workspace ({low:g} to {high:g} mm)"
             )
 
 
@@ -165,8 +166,8 @@ def check_wrench(wrench: Floats, force: float, torque: float) -> None:
         size = math.sqrt(part @ part)
         if not size <= most:
             raise RefusedError(
-                f"{name} {size:.3g} {unit} on the tool is over {most:g} {unit}; raise "
-                f"--max-{name} if it may meet that"
+                f"{name} {beside(size, most, '.3g')} {unit} on the tool is over {most:g} {unit}; "
+                f"raise --max-{name} if it may meet that"
             )
 
 
@@ -218,7 +219,8 @@ def check_late(late: float, info: ServoInfo, period: float) -> None:
     limit = max(info.lookahead / 2.0, period)
     if not late <= limit:
         raise RefusedError(
-            f"{1e3 * late:.0f} ms late, over {1e3 * limit:.0f} ms (half the robot's look-ahead); "
+            f"{beside(1e3 * late, 1e3 * limit, '.0f')} ms late, over {1e3 * limit:g} ms (half the "
+            "robot's look-ahead); "
             "use a quieter computer or a longer look-ahead"
         )
 
@@ -279,7 +281,8 @@ class Trail:
         distance, angle = self.strayed(state)
         if not (distance <= self._distance and angle <= self._angle):
             raise RefusedError(
-                f"following error {distance:.2f} mm, {angle:.3f} rad is over "
+                f"following error {beside(distance, self._distance, '.2f')} mm, "
+                f"{beside(angle, self._angle, '.3f')} rad is over "
                 f"{self._distance:g} mm, {self._angle:g} rad"
             )
 

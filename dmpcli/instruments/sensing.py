@@ -7,7 +7,7 @@ motion, as is silence. Between two samples a loop goes on; without a fresh one i
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.errors import InstrumentError, RefusedError, beside
 from dmpcli.instruments import guards
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo
 from dmpcli.primitives.compensation import rest_zero
@@ -194,7 +194,8 @@ def _check_rest(tool: Tool, sensed: Floats, rotation: Floats, tolerance: float) 
     force, torque = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
     if not (force <= tolerance and torque <= LEVER * tolerance):
         raise RefusedError(
-            f"--tool: leaves {force:.2f} N and {torque:.3f} N·m of the reading at rest, over "
+            f"--tool: leaves {beside(force, tolerance, '.2f')} N and "
+            f"{beside(torque, LEVER * tolerance, '.3f')} N·m of the reading at rest, over "
             f"{tolerance:g} N and {LEVER * tolerance:g} N·m: calibrated for another tool (dmpcli "
             "calibrate), or something touches this one (lift it clear, or give --tool-check N)"
         )

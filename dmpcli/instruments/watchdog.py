@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InstrumentError
+from dmpcli.errors import InstrumentError, beside
 from dmpcli.instruments.protocols import DragTeaching, RobotState, Servo, ServoInfo
 
 LONGEST = 5
@@ -138,7 +138,8 @@ class Watchdog:
                 return
 
     def _late(self, away: float) -> str:
-        return f"watchdog: the loop did not come round for {away:.2f} s, over {self._limit:.2f} s"
+        late = beside(away, self._limit, ".2f")
+        return f"watchdog: the loop did not come round for {late} s, over {self._limit:g} s"
 
     def _bark(self, why: str) -> None:
         """Stop the arm; what fails is tried again until the loop is back, which then does it."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.errors import RefusedError
+from dmpcli.errors import RefusedError, beside
 from dmpcli.kinematics.path import Followed, Peak
 from dmpcli.primitives.reach import Reach, singular
 from dmpcli.streaming.limits import Limits
@@ -57,8 +57,9 @@ class Check:
     def __str__(self) -> str:
         where = self.place if self.t is None else f"at t = {self.t:.3f} s (row {self.row})"
         where = f" {where}" if where else ""
+        value = beside(self.value, self.limit, ".5g")
         return (
-            f"{self.quantity} {self.value:.5g} {self.unit}{where} is over the limit of "
+            f"{self.quantity} {value} {self.unit}{where} is over the limit of "
             f"{self.limit:.5g} {self.unit}; {self.remedy}"
         )
 

@@ -23,8 +23,9 @@ from dmpcli.records.record import Provenance, Record
 from dmpcli.streaming import plan as planning
 from dmpcli.streaming import preflight
 from dmpcli.streaming.contact import LONG, Pressing, Touch
-from dmpcli.streaming.loop import DONE, Arm, Loop, Outcome, Watch
+from dmpcli.streaming.loop import Arm, Watch
 from dmpcli.streaming.plan import Plan, Stroke
+from dmpcli.streaming.plan_loop import DONE, Outcome, PlanLoop
 from dmpcli.streaming.preflight import Check
 from dmpcli.streaming.settings import COUPLED, ExecuteSettings
 from dmpcli.streaming.stroke_file import Batch
@@ -246,12 +247,12 @@ def watch(settings: ExecuteSettings) -> Watch:
     )
 
 
-def record_of(loop: Loop, outcome: Outcome, provenance: Provenance, realtime: bool) -> Record:
+def record_of(loop: PlanLoop, outcome: Outcome, provenance: Provenance, realtime: bool) -> Record:
     """Return the run as a record.
 
     Parameters
     ----------
-    loop : Loop
+    loop : PlanLoop
         Has run, at least one cycle.
     outcome : Outcome
     provenance : Provenance

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import RefusedError
+from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments import guards
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.rotations import log_one
@@ -44,7 +44,8 @@ def check_start(state: RobotState, plan: Plan, limits: Limits) -> None:
     turned = min(_START_ANGLE, max(limits.rotation_speed * plan.period, _NOISE_ANGLE))
     if not (distance <= far and angle <= turned):
         raise RefusedError(
-            f"the arm stands {distance:.3g} mm, {angle:.3g} rad from the first set-point, over "
+            f"the arm stands {beside(distance, far, '.3g')} mm, "
+            f"{beside(angle, turned, '.3g')} rad from the first set-point, over "
             f"{far:.2g} mm, {turned:.2g} rad: it has moved since it was checked; run it again"
         )
 
@@ -88,7 +89,8 @@ class Steps:
             and turning <= (1.0 + _SLACK) * limits.rotation_speed
         ):
             raise RefusedError(
-                f"the next set-point would take {speed:.4g} mm/s, {turning:.3g} rad/s, over "
+                f"the next set-point would take {beside(speed, limits.speed, '.4g')} mm/s, "
+                f"{beside(turning, limits.rotation_speed, '.3g')} rad/s, over "
                 f"{limits.speed:g} mm/s, {limits.rotation_speed:g} rad/s"
             )
         gain, twist = _sizes((step - self._step) / period**2)
@@ -97,7 +99,8 @@ class Steps:
             and twist <= (1.0 + _ACCELERATION_SLACK) * limits.rotation_acceleration
         ):
             raise RefusedError(
-                f"the next set-point would take {gain:.4g} mm/s², {twist:.3g} rad/s², over "
+                f"the next set-point would take {beside(gain, limits.acceleration, '.4g')} mm/s², "
+                f"{beside(twist, limits.rotation_acceleration, '.3g')} rad/s², over "
                 f"{limits.acceleration:g} mm/s², {limits.rotation_acceleration:g} rad/s²"
             )
         self._step = step

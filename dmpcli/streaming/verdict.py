@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dmpcli.errors import beside
 from dmpcli.streaming.many import Judged
 from dmpcli.streaming.plan import Plan
 from dmpcli.streaming.preflight import Check
@@ -101,7 +102,7 @@ def _row(check: Check) -> tuple[str, ...]:
     verdict = "ok" if check.passed else "TOO MUCH"
     return (
         check.quantity,
-        f"{check.value:.5g}",
+        beside(check.value, check.limit, ".5g"),
         f"{check.limit:.5g}",
         check.unit,
         where,

@@ -1,0 +1,1 @@
+"""The control cycle under `record`, `execute` and playback."""
