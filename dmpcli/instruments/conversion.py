@@ -13,7 +13,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments import guards, pose_forms
 from dmpcli.instruments.drivers import (
-    Declaration,
+    DriverInfo,
     DriverState,
     HaltingDriver,
     InverseDriver,
@@ -66,13 +66,7 @@ class PoseServo:
             self._space.check(joints, pose)
             if isinstance(self._driver, InverseDriver):
                 self._space.check_inverse(joints, self._theirs)
-        return ServoInfo(
-            declared.make,
-            declared.period_range,
-            declared.lookahead,
-            declared.queues,
-            declared.period_step,
-        )
+        return declared
 
     @property
     def reach(self) -> Reach | None:
@@ -288,7 +282,7 @@ def servo(driver: ServoDriver, clock: Clock, tool: Tool | None = None) -> PoseSe
     return kind(driver, clock, tool)
 
 
-def _joint_space(declared: Declaration, tool: Tool | None) -> JointSpace | None:
+def _joint_space(declared: DriverInfo, tool: Tool | None) -> JointSpace | None:
     if declared.space == "pose":
         return None
     if declared.model is None:

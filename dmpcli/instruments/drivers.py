@@ -1,23 +1,20 @@
 """What a make of robot has to offer: one small protocol in the controller's own units.
 
 A driver speaks its controller's wire and nothing else. It declares in which space, units and form
-its set-points and states are, and how they are paced; `dmpcli.instruments.conversion` turns a
+its set-points and states are; `dmpcli.instruments.conversion` turns a
 driver into the `Servo` that the loops drive, in mm, rad and rotation matrices, and is the one place
 where anything is converted. `docs/drivers.md` shows how a make is added in one file.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
-from dmpcli.instruments.protocols import RobotMode
+from dmpcli.instruments.protocols import Controlled, RobotMode, ServoInfo
 
 Space = Literal["joint", "pose"]
 """What a set-point is: joint angles, or a pose of the TCP."""
-
-Pacing = Literal["client", "controller"]
-"""Whose clock asks for the next set-point: ours, or the controller's own cycle."""
 
 LengthUnit = Literal["mm", "m"]
 AngleUnit = Literal["rad", "deg"]
@@ -27,20 +24,13 @@ Orientation = Literal["xyz euler", "zyx euler", "rotation vector", "quaternion"]
 R = Rz(rz) Ry(ry) Rx(rx); a rotation vector; or a unit quaternion w, x, y, z."""
 
 
-@dataclass(frozen=True)
-class Declaration:
-    """What a servo driver declares of its controller.
+@dataclass(frozen=True, kw_only=True)
+class DriverInfo(ServoInfo):
+    """What a servo driver declares of its controller, beside what the loops ask of any servo.
 
     Attributes
     ----------
-    make : str
-        Such as ``Elite EC66``; for messages and files.
     space : str
-    pacing : str
-    period_range : tuple of float
-        Shortest and longest servo period, s.
-    lookahead : float
-        Time between a set-point's arrival and its being reached, s.
     length, angle : str
         Units of its set-points and states.
     orientation : str
@@ -54,18 +44,11 @@ class Declaration:
         By how much the joints' pose may differ from the reported one at the start, mm and rad.
     remedy : str
         What to say where it differs by more: which options change it.
-    queues : bool
-        Whether it takes one set-point per period from a queue of one look-ahead, by its own clock;
-        see `ServoInfo`.
-    period_step : float
-        Servo periods are whole multiples of it, s; 0 takes any.
+    pacing : str
+        Drivers of version 0.1 declared it; nothing reads it.
     """
 
-    make: str
     space: Space
-    pacing: Pacing
-    period_range: tuple[float, float]
-    lookahead: float
     length: LengthUnit
     angle: AngleUnit
     orientation: Orientation
@@ -74,8 +57,7 @@ class Declaration:
     flange_turn: float = 0.0
     tolerance: tuple[float, float] = (2.0, 0.02)
     remedy: str = ""
-    queues: bool = False
-    period_step: float = 0.0
+    pacing: InitVar[str | None] = None
 
 
 @dataclass(frozen=True)
@@ -104,32 +86,20 @@ class DriverState:
     detail: str = ""
 
 
-class ServoDriver(Protocol):
+class ServoDriver(Controlled, Protocol):
     """One make of robot controller."""
 
-    def connect(self) -> Declaration:
+    def connect(self) -> DriverInfo:
         """Connect and make sure that it may be driven; InstrumentError or RefusedError if not."""
 
     def state(self) -> DriverState:
         """Return what the controller last reported; InstrumentError when that is too old."""
-
-    def start(self, period: float) -> None:
-        """Enter servo mode with one set-point every `period` s."""
 
     def send(self, target: Floats) -> bool:
         """Send one set-point; False when the controller did not take it.
 
         `target` holds joint angles, shape (n,), or a pose, shape (6,) or (7,), as declared.
         """
-
-    def buffer_level(self) -> int | None:
-        """Set-points that the controller still holds; None where it does not tell."""
-
-    def stop(self) -> None:
-        """Leave servo mode and stand still at once; may be called twice."""
-
-    def close(self) -> None:
-        """Disconnect; stops first if still moving; may be called twice."""
 
 
 @runtime_checkable

@@ -172,7 +172,7 @@ def test_without_ur_rtde_the_extra_is_named(fakes, monkeypatch, module):
 
 def test_it_declares_poses_in_metres_with_rotation_vectors(fakes):
     declared = driver(lookahead="0.15", watchdog="25").connect()
-    assert (declared.space, declared.pacing) == ("pose", "client")
+    assert declared.space == "pose"
     assert (declared.length, declared.angle) == ("m", "rad")
     assert declared.orientation == "rotation vector"
     assert declared.lookahead == 0.15

@@ -34,10 +34,6 @@ class ArmDriver:
         """Joint angles of a TCP pose by the controller; see `Controller.inverse`."""
         return self._controller.inverse(pose, near)
 
-    def buffer_level(self) -> int | None:
-        """The controller does not tell."""
-        return None
-
     def stop(self) -> None:
         """Stop; what was never begun is not stopped."""
         if self._begun:

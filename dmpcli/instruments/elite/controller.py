@@ -8,7 +8,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, RefusedError
-from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.drivers import DriverInfo, DriverState
 from dmpcli.instruments.elite.frames import Report
 from dmpcli.instruments.elite.jsonrpc import Client
 from dmpcli.instruments.elite.monitor import Monitor
@@ -66,7 +66,7 @@ class Controller:
         self._reported: Floats | None = None
         self.requests = Requests(self._client, self.name)
 
-    def declaration(self, lookahead: float) -> Declaration:
+    def declaration(self, lookahead: float) -> DriverInfo:
         """Return what the controller declares.
 
         Parameters
@@ -75,10 +75,9 @@ class Controller:
             s.
         """
         s = self._settings
-        return Declaration(
+        return DriverInfo(
             make=MAKE,
             space="joint",
-            pacing="client",
             period_range=PERIODS,
             lookahead=lookahead,
             length="mm",

@@ -12,7 +12,7 @@ from dataclasses import replace
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments import guards
-from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.drivers import DriverInfo, DriverState
 from dmpcli.instruments.elite.base import ArmDriver
 from dmpcli.instruments.elite.settings import Settings
 from dmpcli.instruments.protocols import Clock
@@ -40,7 +40,7 @@ class StreamDriver(ArmDriver):
         super().__init__(settings, clock)
         self._running = False
 
-    def connect(self) -> Declaration:
+    def connect(self) -> DriverInfo:
         """Connect; see `Controller.connect`.
 
         Raises

@@ -10,7 +10,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError
-from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.drivers import DriverInfo, DriverState
 from dmpcli.instruments.elite.base import ArmDriver
 
 START_DELAY = 0.2
@@ -30,7 +30,7 @@ class FileDriver(ArmDriver):
 
     STOPS = (("stop_trajectory", {}), ("stop", {}))
 
-    def connect(self) -> Declaration:
+    def connect(self) -> DriverInfo:
         """Connect; see `Controller.connect`."""
         self._controller.connect()
         return self._controller.declaration(START_DELAY)

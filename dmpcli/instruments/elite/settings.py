@@ -38,7 +38,7 @@ class Settings:
     orientation : str
         What the controller's rx, ry, rz are.
     base_turn, flange_turn : float
-        rad; see `Declaration`.
+        rad; see `DriverInfo`.
     tolerance : float
         Of the checks at the start, mm; 0 leaves them out.
     word : int or None
