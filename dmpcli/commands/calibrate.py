@@ -228,7 +228,7 @@ def _take(
     from dmpcli.streaming.loop import Arm
 
     rate = min(settings.sensor_rate, info.rate)
-    robot = watched(bench.robot) if bench.lab is None else bench.robot
+    robot = bench.robot if bench.lock_step else watched(bench.robot)
     arm = Arm(robot, robot.open(), clock)
     bench.sensor.start(rate)
     sensing = Sensing(bench.sensor, info, rate, settings.period, clock)

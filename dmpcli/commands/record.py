@@ -109,7 +109,7 @@ def command(
     check(settings)
     addresses = urls.check(robot, sensor, allow_mixed)
     repeatable = urls.repeatable(addresses)
-    _check_tutored(given, repeatable)
+    _check_tutored(given, all(address.simulated for address in addresses))
     urls.need_tool(addresses[1], tool is not None)
     realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
@@ -132,6 +132,8 @@ def command(
     if bench.note:
         tell(bench.note, quiet)
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
+    if not realtime and rehearsed.longest == float("inf"):
+        raise InputError("--duration: say how long, for in simulated time nobody presses Enter")
     ending = Ending(DEFECT)
     options = {
         "robot": urls.in_provenance(robot),

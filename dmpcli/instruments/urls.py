@@ -1,17 +1,11 @@
 """From two URLs to the bench: mock instruments in one lab, or the drivers that are installed."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments import conversion, registry
-from dmpcli.instruments.address import (
-    MOCK,
-    Address,
-    in_provenance,
-    need_tool,
-    parse,
-    repeatable,
-)
+from dmpcli.instruments.address import MOCK, Address, in_provenance, need_tool, split
 from dmpcli.instruments.mock import Lab, MockSensor, MockServo, Scene
 from dmpcli.instruments.mock import options as mock
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo, Servo
@@ -44,6 +38,8 @@ class Bench:
         What the mock ones share; None where any instrument is real.
     simulated : bool
         Whether any of it is.
+    lock_step : bool
+        Whether all of it keeps to whatever clock it was given.
     note : str or None
         What the person should know before the arm moves.
     """
@@ -52,6 +48,7 @@ class Bench:
     sensor: Sensor
     lab: Lab | None
     simulated: bool
+    lock_step: bool
     note: str | None = None
 
 
@@ -77,6 +74,44 @@ class NoSensor:
 
     def close(self) -> None:
         """Nothing is open."""
+
+
+def parse(url: str, role: str) -> Address:
+    """Take a URL apart, and make sure that there is a driver for it.
+
+    Parameters
+    ----------
+    url, role : str
+        As in `address.split`.
+
+    Raises
+    ------
+    InputError
+        No driver is registered for the scheme in this role, host or port is missing or wrong, or
+        an option of the mock is unknown or is not a number in its range.
+    """
+    scheme, colon, _ = url.partition(":")
+    # Looking up the drivers would slow down the start of every rehearsal, which needs none.
+    if not colon or (scheme != "mock" and scheme not in registry.schemes(role)):
+        choices = ", ".join([MOCK, *(f"{s}://HOST" for s in registry.schemes(role))])
+        raise InputError(f"--{role} {url}: no such instrument; a {role} is one of {choices}")
+    address = split(url, role)
+    if address.simulated:
+        mock.numbers(address.options, f"--{role} {url}")
+    return address
+
+
+def repeatable(addresses: Iterable[Address]) -> bool:
+    """Tell whether a run can be made again: all of its instruments keep to simulated time.
+
+    One real instrument makes it a measurement, which is paced by the real clock and whose file is
+    not replaced unasked.
+
+    Parameters
+    ----------
+    addresses : iterable of Address
+    """
+    return all(registry.lock_step(address) for address in addresses)
 
 
 def check(robot: str, sensor: str | None = MOCK, allow_mixed: bool = False) -> tuple[Address, ...]:
@@ -162,7 +197,8 @@ def connect(
     if sensor is None and mocks:
         feeler = MockSensor(lab)
     whole = len(mocks) == len(addresses)
-    return Bench(arm, feeler, lab if whole else None, simulated=bool(mocks), note=note)
+    steps = [registry.lock_step(address) for address in addresses]
+    return Bench(arm, feeler, lab if whole else None, any(steps), all(steps), note)
 
 
 def _robot(address: Address, lab: Lab, clock: Clock, tool: Tool | None) -> tuple[Servo, str | None]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmpcli.instruments.address import parse
+from dmpcli.instruments.urls import parse
 from tests.commands.virtual_lab import FREE_PORTS, Lab, run
 from tests.instruments.virtual.virtual_fakes import Client
 

@@ -14,19 +14,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Floats
 from dmpcli.instruments.netft import protocol
 from dmpcli.instruments.netft.protocol import Command
-from dmpcli.instruments.netft.status import WARNING
 from dmpcli.instruments.virtual.rdt_faults import BoxFaults
 from dmpcli.instruments.virtual.rdt_pages import Pages
 from dmpcli.instruments.virtual.rdt_sender import Sender
-from dmpcli.instruments.virtual.rdt_settings import INTERNAL_RATE, BoxSettings, rounded_up
+from dmpcli.instruments.virtual.rdt_settings import BoxSettings
+from dmpcli.instruments.virtual.rdt_state import BoxState
 from dmpcli.instruments.virtual.rdt_tcp import TcpService
 
 _STARTS = (Command.START, Command.START_AXIA, Command.START_BUFFERED)
 _LATEST = 0.5
-_INT32 = 2**31 - 1
 
 
 @dataclass
@@ -51,35 +50,20 @@ class _Request:
         return self.begun + (self.number + self.size) * self.period
 
 
-class RdtBox:
+class RdtBox(BoxState):
     """The box.
 
     Parameters
     ----------
-    read : callable
-        ``read(t)`` gives the sensed wrench at `t` on `time.monotonic`, shape (6,), N and N·m,
-        neither clipped nor quantised. It is called from the box's threads, one call at a time.
-    settings : BoxSettings, optional
-    faults : BoxFaults, optional
-        May be changed while the box runs.
+    read, settings, faults
+        As in `BoxState`.
 
     Attributes
     ----------
-    faults : BoxFaults
     sender : Sender
         Counts the faults that were done, from `start` on.
     rdt_port, http_port, tcp_port : int
         As bound by `start`; 0 for those that an OnRobot box does not have.
-    latched : bool
-        A monitor condition is latched, until a client resets it.
-    enabled : bool
-        Whether RDT is switched on; a box where it is not serves no stream.
-    rate : int
-        RDT records per second as the box prints it, Hz.
-    records : int
-        In one datagram of a buffered stream.
-    low_pass : int
-        Number of the filter that was set; it has no effect on the readings.
     """
 
     def __init__(
@@ -88,20 +72,9 @@ class RdtBox:
         settings: BoxSettings | None = None,
         faults: BoxFaults | None = None,
     ) -> None:
-        self.settings = settings or BoxSettings()
-        self.faults = faults or BoxFaults()
-        self.latched = False
-        self.enabled = True
-        self.low_pass = 0
-        self.records = self.settings.records
-        self.rate, self._true_rate = rounded_up(self.settings.rate)
+        super().__init__(read, settings, faults)
         self.rdt_port = self.http_port = self.tcp_port = 0
-        self._read, self._reading = read, threading.Lock()
-        self._bias: Integers = np.zeros(6, np.int64)
-        self._counts_per_unit = 1.0 / self.settings.scale.per_count
-        most = np.round(self.settings.limit * self._counts_per_unit)
-        self._most = np.minimum(most, _INT32).astype(np.int64)
-        self._started = self._powered = self._sampled = time.monotonic()
+        self._started = self._sampled = self._powered
         self._request: _Request | None = None
         self._thread: threading.Thread | None = None
 
@@ -144,48 +117,6 @@ class RdtBox:
         """Who is being streamed to."""
         request = self._request
         return None if request is None else request.client
-
-    def set_rate(self, rate: int) -> None:
-        """Set the RDT rate, Hz, rounded up to one that the box has; a stream keeps its own."""
-        self.rate, self._true_rate = rounded_up(rate)
-
-    def set_bias(self, axis: int, counts: int) -> None:
-        """Set what is subtracted from one axis, counts."""
-        self._bias[axis] = counts
-
-    def bias(self) -> Integers:
-        """What is subtracted from the readings, counts, shape (6,)."""
-        return self._bias.copy()
-
-    def restart(self) -> None:
-        """Let the sensor's own counter begin anew and forget the bias, as a power cycle does.
-
-        The stream of a real box would end too; here it goes on, so that a client sees the counter.
-        """
-        self._powered = time.monotonic()
-        self._bias[:] = 0
-
-    def reading(self, t: float) -> tuple[Integers, int]:
-        """Counts, shape (6,), and status of the reading at `t`.
-
-        Parameters
-        ----------
-        t : float
-            s, on `time.monotonic`.
-        """
-        with self._reading:
-            wrench = self._read(t)
-        counts = np.round(wrench * self._counts_per_unit).astype(np.int64)
-        most = self._most
-        if self.faults.saturated:
-            counts = np.where(counts < 0, -most, most)
-        status = WARNING if self.latched else 0
-        if (np.abs(counts) >= most).any():
-            status |= self.settings.saturated
-        if self.faults.status is not None:
-            status = self.faults.status
-        # The gages saturate before the bias is taken off.
-        return np.clip(counts, -most, most) - self._bias, status
 
     def _serve(self) -> None:
         while True:
@@ -258,5 +189,5 @@ class RdtBox:
         if not self.faults.stalled:
             self._sampled = request.begun + request.number * request.period
         counts, status = self.reading(self._sampled)
-        passed = int((self._sampled - self._powered) * INTERNAL_RATE)
+        passed = self.passed(self._sampled)
         return protocol.encode(request.number, passed, status, counts)

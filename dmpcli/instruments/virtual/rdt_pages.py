@@ -7,15 +7,12 @@ import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
-from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
 
 from dmpcli.instruments.netft.settings import FILTERS
 from dmpcli.instruments.virtual.rdt_settings import INTERNAL_RATE
-
-if TYPE_CHECKING:
-    from dmpcli.instruments.virtual.rdt_box import RdtBox
+from dmpcli.instruments.virtual.rdt_state import BoxState
 
 _BIASES = {f"setbias{axis}": axis for axis in range(6)}
 _MOST_RECORDS = 40
@@ -26,10 +23,10 @@ class Pages:
 
     Parameters
     ----------
-    box : RdtBox
+    box : BoxState
     """
 
-    def __init__(self, box: "RdtBox") -> None:
+    def __init__(self, box: BoxState) -> None:
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
                 status, kind, page = get(box, self.path)
@@ -70,12 +67,12 @@ class _Server(ThreadingHTTPServer):
         """A client that goes away is none of the box's business."""
 
 
-def get(box: "RdtBox", path: str) -> tuple[int, str, str]:
+def get(box: BoxState, path: str) -> tuple[int, str, str]:
     """Answer one request.
 
     Parameters
     ----------
-    box : RdtBox
+    box : BoxState
     path : str
         With its query.
 
@@ -97,7 +94,7 @@ def get(box: "RdtBox", path: str) -> tuple[int, str, str]:
     return 404, "text/html", "<html><body>no such page</body></html>"
 
 
-def _change(box: "RdtBox", path: str, key: str, text: str) -> bool:
+def _change(box: BoxState, path: str, key: str, text: str) -> bool:
     """Change one setting; False where it is not known, or the value is wrong."""
     try:
         value = int(text)
@@ -118,7 +115,7 @@ def _change(box: "RdtBox", path: str, key: str, text: str) -> bool:
     return True
 
 
-def _settings(box: "RdtBox") -> dict[str, str]:
+def _settings(box: BoxState) -> dict[str, str]:
     s = box.settings
     counts, status = box.reading(time.monotonic())
     # A page gives the range in the units that the box is set to.
@@ -144,7 +141,7 @@ def _settings(box: "RdtBox") -> dict[str, str]:
     }
 
 
-def _calibration(box: "RdtBox") -> dict[str, str]:
+def _calibration(box: BoxState) -> dict[str, str]:
     scale = box.settings.scale
     return {
         "calsn": box.settings.serial,

@@ -8,15 +8,12 @@ import socketserver
 import struct
 import threading
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.instruments.netft import units
 from dmpcli.instruments.netft.protocol import MAGIC
-
-if TYPE_CHECKING:
-    from dmpcli.instruments.virtual.rdt_box import RdtBox
+from dmpcli.instruments.virtual.rdt_state import BoxState
 
 COMMAND_SIZE = 20
 READFT, READCALINFO = 0, 1
@@ -30,10 +27,10 @@ class TcpService:
 
     Parameters
     ----------
-    box : RdtBox
+    box : BoxState
     """
 
-    def __init__(self, box: "RdtBox") -> None:
+    def __init__(self, box: BoxState) -> None:
         class Handler(socketserver.BaseRequestHandler):
             def handle(self) -> None:
                 with contextlib.suppress(OSError):
@@ -66,12 +63,12 @@ class _Server(socketserver.ThreadingTCPServer):
     block_on_close = False
 
 
-def answer(box: "RdtBox", command: bytes) -> bytes:
+def answer(box: BoxState, command: bytes) -> bytes:
     """Return the reply to one command of 20 bytes; nothing to one that is not known.
 
     Parameters
     ----------
-    box : RdtBox
+    box : BoxState
     command : bytes
     """
     scale = box.settings.scale
