@@ -21,6 +21,12 @@ from dmpcli.instruments.netft import options as netft
 PAGE = (Path(__file__).parents[2] / "docs" / "drivers.md").read_text()
 
 
+def example(scheme):
+    """The page's driver of that scheme."""
+    codes = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    return next(code for code in codes if code.startswith(f'"""``{scheme}://'))
+
+
 class Acme(socketserver.ThreadingTCPServer):
     """The controller that the page imagines: a line in, a line out."""
 
@@ -50,7 +56,7 @@ class Acme(socketserver.ThreadingTCPServer):
 
 @pytest.fixture
 def acme(tmp_path, monkeypatch):
-    code = re.search(r"```python\n(.*?)```", PAGE, re.S)[1]
+    code = example("acme")
     (tmp_path / "dmpcli_acme.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     points = re.findall(r'entry-points\."([^"]+)"\]\n(\w+) = "([^"]+)"', PAGE)
