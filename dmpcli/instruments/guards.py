@@ -76,9 +76,19 @@ def check_state(state: RobotState, box: Box | None = None) -> None:
         The pose is not a number.
     """
     check_ready(state)
+    check_pose(state)
+    check_inside(state.position, box, "the tool")
+
+
+def check_pose(state: RobotState) -> None:
+    """Refuse to believe a pose that is not a number.
+
+    Raises
+    ------
+    InstrumentError
+    """
     if not finite(state.position, state.rotation):
         raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
-    check_inside(state.position, box, "the tool")
 
 
 def finite(*arrays: Floats) -> bool:

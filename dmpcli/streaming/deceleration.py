@@ -9,20 +9,17 @@ import numpy as np
 _FRACTION = np.linspace(0.0, 1.0, 201)[1:-1]
 
 
-def rate(elapsed: float, duration: float) -> float:
-    """Rate of path time, from 1 at once to 0 at `duration`, smooth at both ends.
+def progress(elapsed: float, duration: float) -> float:
+    """Path time spent since the ramp began, s: duration/2 in the end.
+
+    The integral of its rate ``1 - u² (3 - 2u)``, where ``u = elapsed/duration``: from 1 at once to
+    0 at `duration`, smooth at both ends.
 
     Parameters
     ----------
     elapsed, duration : float
         s.
     """
-    u = min(max(elapsed / duration, 0.0), 1.0)
-    return 1.0 - u**2 * (3.0 - 2.0 * u)
-
-
-def progress(elapsed: float, duration: float) -> float:
-    """Path time spent since the ramp began, s: the integral of `rate`, duration/2 in the end."""
     u = min(max(elapsed / duration, 0.0), 1.0)
     return duration * (u - u**3 + u**4 / 2.0)
 

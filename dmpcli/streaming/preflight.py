@@ -1,13 +1,12 @@
 """What can be judged before an arm moves, on arrays alone."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.errors import RefusedError, beside
+from dmpcli.errors import beside
 from dmpcli.kinematics.path import Followed, Peak
 from dmpcli.primitives.reach import Reach, singular
 from dmpcli.streaming.limits import Limits
@@ -62,18 +61,6 @@ class Check:
             f"{self.quantity} {value} {self.unit}{where} is over the limit of "
             f"{self.limit:.5g} {self.unit}; {self.remedy}"
         )
-
-
-def refuse_any(checks: Iterable[Check]) -> None:
-    """Raise for the first check that failed.
-
-    Raises
-    ------
-    RefusedError
-    """
-    for check in checks:
-        if not check.passed:
-            raise RefusedError(str(check))
 
 
 def at_rest(stroke: Stroke, speed: float, period: float, limits: Limits) -> list[Check]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dmpcli.errors import RefusedError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.rotations import from_euler
 from dmpcli.streaming.limits import Limits
@@ -132,3 +133,10 @@ def rows_of(log):
     columns = (t, t_plan, *poses, deadline, lateness, wrench, coupling)
     words = (rows.words("state"), rows.words("phase"), ids)
     return [Row(*row) for row in zip(*columns, *words, strict=True)]
+
+
+def refuse_any(checks):
+    """Raise for the first check that failed, as the command does for a stroke's."""
+    for check in checks:
+        if not check.passed:
+            raise RefusedError(str(check))

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -7,23 +8,26 @@ from dmpcli.streaming import deceleration
 u = np.linspace(0.0, 1.0, 2001)
 
 
-def test_rate_falls_from_one_to_zero_and_stays():
-    r = np.array([deceleration.rate(x, 0.4) for x in 0.4 * u])
-    assert (r[0], r[-1]) == (1.0, 0.0)
-    assert np.all(np.diff(r) < 0)
-    assert deceleration.rate(9.0, 0.4) == 0.0
+def rate(elapsed, duration):
+    """How fast path time runs: from 1 at once to 0 at the end, smooth at both."""
+    share = min(max(elapsed / duration, 0.0), 1.0)
+    return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
-def test_rate_begins_and_ends_smoothly():
-    slope = np.gradient([deceleration.rate(x, 1.0) for x in u], u)
-    assert abs(slope[0]) < 2e-3
-    assert abs(slope[-1]) < 2e-3
+def test_progress_runs_from_one_to_rest_smoothly():
+    spent = np.array([deceleration.progress(x, 1.0) for x in u])
+    speed = np.gradient(spent, u, edge_order=2)
+    assert speed[[0, -1]] == pytest.approx([1.0, 0.0], abs=1e-5)
+    assert np.all(np.diff(speed[1:-1]) < 0.0)
+    slope = np.gradient(speed, u)
+    assert np.abs(slope[[0, -1]]).max() < 4e-3
+    assert deceleration.progress(9.0, 0.4) == deceleration.progress(0.4, 0.4)
 
 
 def test_progress_is_the_integral_of_the_rate():
     duration = 0.7
     t = duration * u
-    r = np.array([deceleration.rate(x, duration) for x in t])
+    r = np.array([rate(x, duration) for x in t])
     integral = np.concatenate([[0.0], np.cumsum((r[1:] + r[:-1]) / 2 * np.diff(t))])
     progress = [deceleration.progress(x, duration) for x in t]
     np.testing.assert_allclose(progress, integral, atol=1e-6)

@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, stroke
+from streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 
 from dmpcli.errors import RefusedError
 from dmpcli.streaming import preflight
@@ -22,7 +22,7 @@ def test_the_papers_stroke_passes():
     checks = preflight.within_limits(plan(source), source, WIDE)
     checks += preflight.at_rest(source, 1.0, 0.02, WIDE)
     assert failed(checks) == []
-    preflight.refuse_any(checks)
+    refuse_any(checks)
 
 
 def test_peaks_are_those_of_the_closed_form():
@@ -56,7 +56,7 @@ def test_each_limit_is_kept_on_its_own(quantity, limit):
     assert failed(checks) == [quantity]
     option = "--max-" + quantity.replace(" ", "-")
     with pytest.raises(RefusedError, match=f"^{quantity} .* at t = .*row .* over.*{option}"):
-        preflight.refuse_any(checks)
+        refuse_any(checks)
 
 
 def test_the_speed_that_is_advised_passes():
@@ -117,7 +117,7 @@ def test_a_file_in_motion_at_an_end_is_refused_with_the_remedy(first, last, quan
     checks = preflight.at_rest(cut(stroke(), first, last), 1.0, 0.02, WIDE)
     assert failed(checks) == [quantity]
     with pytest.raises(RefusedError, match=option):
-        preflight.refuse_any(checks)
+        refuse_any(checks)
 
 
 def test_rotation_in_motion_at_an_end_is_refused():
@@ -145,7 +145,7 @@ def test_the_arm_must_stand_at_the_start():
     assert len(failed(preflight.near_start(2.1, 0.03, 2.0, 0.035))) == 1
     assert len(failed(preflight.near_start(2.1, 0.04, 2.0, 0.035))) == 2
     with pytest.raises(RefusedError, match="--approach"):
-        preflight.refuse_any(preflight.near_start(2.1, 0.0, 2.0, 0.035))
+        refuse_any(preflight.near_start(2.1, 0.0, 2.0, 0.035))
 
 
 def test_what_is_not_a_number_passes_no_check():

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from streaming_fakes import PEN_DOWN, START, WIDE, plan, stroke
+from streaming_fakes import PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
@@ -51,7 +51,7 @@ def test_a_pose_out_of_reach_is_one_row_with_its_distance_and_place():
     assert check.value == pytest.approx(worst.max(), rel=1e-6)
     assert check.row == 5 + int(worst.argmax())
     with pytest.raises(RefusedError, match=r"^distance out .* mm at t = .*\(row \d+\) is over"):
-        preflight.refuse_any([check])
+        refuse_any([check])
 
 
 def test_too_fast_a_joint_is_named_and_the_advised_speed_passes():
