@@ -19,11 +19,12 @@ from typing import Protocol
 from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments import guards
-from dmpcli.instruments.guards import Box, Trail
+from dmpcli.instruments.guards import Trail
 from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.pace import Pace, undisturbed
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
 from dmpcli.instruments.rest import Rest
+from dmpcli.streaming.limits import Box
 
 Pose = tuple[Floats, Floats]
 

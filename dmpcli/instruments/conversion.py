@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError, RefusedError
-from dmpcli.instruments import guards, pose_forms
+from dmpcli.instruments import pose_forms
 from dmpcli.instruments.drivers import (
     DriverInfo,
     DriverState,
@@ -134,7 +134,7 @@ class PoseServo:
         """
         if not self._started:
             return False
-        if not guards.finite(position, rotation):
+        if not finite(position, rotation):
             return False
         if self._space is None:
             return self._driver.send(pose_forms.encode(self._declared, position, rotation))
@@ -171,7 +171,7 @@ class PoseServo:
         """Actual joint angles, rad."""
         if said.joints is None:
             return None
-        if not (said.joints.ndim == 1 and guards.finite(said.joints)):
+        if not (said.joints.ndim == 1 and finite(said.joints)):
             raise self._senseless("joint angles that are not numbers")
         if self._space is not None and len(said.joints) != 6:
             raise self._senseless(f"{len(said.joints)} joint angles")
@@ -199,7 +199,7 @@ class PoseServo:
         found = self._driver.inverse(pose, self._written(near))
         if found is None:
             return None
-        if not (found.shape == (6,) and guards.finite(found)):
+        if not (found.shape == (6,) and finite(found)):
             raise self._senseless("an inverse that is not six numbers")
         return self._radians(found)
 

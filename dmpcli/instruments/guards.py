@@ -9,28 +9,13 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
-
-Box = tuple[float, float, float, float, float, float]
-"""xmin, xmax, ymin, ymax, zmin, zmax, mm, base frame."""
+from dmpcli.streaming.limits import Box, check_inside
 
 LAG = 0.1
 """The actual pose may lag the set-points by this much more than the look-ahead, s."""
-
-
-def ordered(box: Box) -> Box:
-    """Return a workspace whose minima lie below its maxima.
-
-    Raises
-    ------
-    ValueError
-        They do not.
-    """
-    if not all(low < high for low, high in zip(box[::2], box[1::2], strict=True)):
-        raise ValueError("each minimum of the workspace must lie below its maximum")
-    return box
 
 
 def check_streams(robot: Servo) -> None:
@@ -89,54 +74,6 @@ def check_pose(state: RobotState) -> None:
     """
     if not finite(state.position, state.rotation):
         raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
-
-
-def finite(*arrays: Floats) -> bool:
-    """Tell whether every number of a few small arrays is finite: in plain floats, for loops."""
-    for array in arrays:  # noqa: SIM110 (a generator would take as long again)
-        if not all(map(math.isfinite, array.ravel().tolist())):
-            return False
-    return True
-
-
-def within(values: Floats, limits: Floats) -> bool:
-    """Tell whether every |value| is below its limit; in plain floats, as `finite`.
-
-    Parameters
-    ----------
-    values, limits : array, shape (n,)
-    """
-    pairs = zip(values.tolist(), limits.tolist(), strict=True)
-    for value, limit in pairs:  # noqa: SIM110 (a generator would take as long again)
-        if not -limit < value < limit:
-            return False
-    return True
-
-
-def check_inside(position: Floats, box: Box | None, what: str) -> None:
-    """Refuse a position outside the workspace.
-
-    Parameters
-    ----------
-    position : array, shape (3,)
-        mm.
-    box : tuple of float or None
-        None is no bound.
-    what : str
-        Whose position it is, for the message.
-
-    Raises
-    ------
-    RefusedError
-    """
-    if box is None:
-        return
-    for axis, value, low, high in zip("xyz", position.tolist(), box[::2], box[1::2], strict=True):
-        if not low <= value <= high:
-            text = beside(value, low if value < low else high, ".3f")
-            raise RefusedError(
-                f"{what} at {axis} = {text} mm leaves the workspace ({low:g} to {high:g} mm)"
-            )
 
 
 def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:

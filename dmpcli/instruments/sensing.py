@@ -6,9 +6,8 @@ motion, as is silence. Between two samples a loop goes on; without a fresh one i
 
 import numpy as np
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, finite, within
 from dmpcli.errors import InstrumentError, RefusedError, beside
-from dmpcli.instruments import guards
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo
 from dmpcli.primitives.compensation import rest_zero
 from dmpcli.primitives.identification import LEVER
@@ -164,11 +163,11 @@ class Sensing:
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is no array of six, stopped; check its driver"
             )
-        if not guards.finite(sample.wrench):
+        if not finite(sample.wrench):
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is not a number, stopped; check its driver"
             )
-        if not guards.within(sample.wrench, self._limit):
+        if not within(sample.wrench, self._limit):
             axis = int(np.argmax(np.abs(sample.wrench) >= self._limit))
             raise InstrumentError(
                 f"force sensor: {_AXES[axis]} = {sample.wrench[axis]:.3g} is over "

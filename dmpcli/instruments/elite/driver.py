@@ -9,9 +9,8 @@ import contextlib
 import math
 from dataclasses import replace
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError
-from dmpcli.instruments import guards
 from dmpcli.instruments.drivers import DriverInfo, DriverState
 from dmpcli.instruments.elite.base import ArmDriver
 from dmpcli.instruments.elite.settings import Settings
@@ -104,7 +103,7 @@ class StreamDriver(ArmDriver):
 
     def send(self, target: Floats) -> bool:
         """Send joint angles, shape (6,), degrees; False when they were not taken."""
-        if not (self._running and target.shape == (6,) and guards.finite(target)):
+        if not (self._running and target.shape == (6,) and finite(target)):
             return False
         params = {"targetPos": target.tolist()}
         if self._settings.responses:

@@ -1,8 +1,7 @@
 """The mock lab behind the two protocols that real instruments obey."""
 
-from dmpcli.arrays import Floats
+from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InstrumentError
-from dmpcli.instruments import guards
 from dmpcli.instruments.mock.arms import DraggedArm
 from dmpcli.instruments.mock.lab import Lab
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo, ServoInfo
@@ -119,7 +118,7 @@ class MockServo:
             return False
         if lab.mode != "ready" or lab.refuses:
             return False
-        if not guards.finite(position, rotation):
+        if not finite(position, rotation):
             return False
         lab.arm.send(position, rotation)
         return True

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dmpcli.arrays import Floats
-from dmpcli.instruments import guards
+from dmpcli.arrays import Floats, within
 from dmpcli.instruments.netft import protocol
 from dmpcli.instruments.netft.mailbox import Letter
 from dmpcli.instruments.netft.sequence import Sequence, Verdict
@@ -176,7 +175,7 @@ class Stream:
         if serious(status):
             return describe(status, self.family)
         self.tally.warnings += 1 if status else 0
-        if guards.within(wrench, self.limit):
+        if within(wrench, self.limit):
             return ""
         axis = int(np.argmin(np.abs(wrench) < self.limit))
         return (
