@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.control import guards
+from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InstrumentError
-from dmpcli.instruments import guards
 from dmpcli.instruments.protocols import Clock, RobotState, Sample, Servo
-from dmpcli.instruments.sensing import Sensing
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.rotations import exp, log
 

@@ -5,9 +5,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from dmpcli.planning.limits import Limits, ordered
 from dmpcli.primitives.identification import CONDITION
 from dmpcli.records.settings import Settings
-from dmpcli.streaming.limits import Limits, ordered
 
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]

@@ -24,17 +24,17 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.commands.keeping import Keeper
-    from dmpcli.instruments.urls import Bench
+    from dmpcli.control.cycle import ReadyArm
+    from dmpcli.control.execution_plan import CheckedPlan
+    from dmpcli.control.plan_loop import Outcome, PlanLoop
+    from dmpcli.control.stroke_file import Batch
+    from dmpcli.control.workcell import Workcell
     from dmpcli.primitives.coupling import Filter
     from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.record import Provenance
     from dmpcli.records.streams import Source
-    from dmpcli.streaming.loop import Arm
-    from dmpcli.streaming.many import Judged
-    from dmpcli.streaming.plan_loop import Outcome, PlanLoop
     from dmpcli.streaming.settings import ExecuteSettings
-    from dmpcli.streaming.stroke_file import Batch
 
 
 def command(
@@ -185,22 +185,28 @@ class Request:
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
     from dmpcli.commands.keeping import Keeper
     from dmpcli.commands.messages import tell, warn
-    from dmpcli.instruments import guards, urls
+    from dmpcli.control import (
+        execution,
+        execution_plan,
+        guards,
+        preflight_table,
+        stroke_file,
+        workcell,
+    )
+    from dmpcli.control.cycle import ReadyArm
+    from dmpcli.control.watchdog import watched
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.watchdog import watched
     from dmpcli.records import streams
-    from dmpcli.streaming import many, session, stroke_file, verdict
-    from dmpcli.streaming.loop import Arm
 
-    addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
+    addresses = workcell.check(request.robot, request.sensor, request.allow_mixed)
     if request.sensor is not None:
-        urls.need_tool(addresses[1], request.tool is not None)
-    repeatable = urls.repeatable(addresses)
+        workcell.need_tool(addresses[1], request.tool is not None)
+    repeatable = workcell.repeatable(addresses)
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
     batch = stroke_file.find(request.trajectory, request.ids)
     _warn_of(batch, streams.shown(request.trajectory))
-    coupling = session.coupling_of(batch, settings) if request.presses else None
+    coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
     keeper = None
@@ -209,10 +215,10 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
-    scene = session.scene(first.stroke, request.presses, above)
+    scene = execution.scene(first.stroke, request.presses, above)
     # What weighs on the sensor counts only where there is one.
     held = _decoded(tool_file, weighed=request.sensor is not None)
-    bench = urls.connect(
+    bench = workcell.connect(
         request.robot,
         request.sensor,
         clock,
@@ -224,46 +230,48 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         tell(bench.note, request.quiet)
     robot = watched(bench.robot) if realtime else bench.robot
     try:
-        arm = Arm(robot, robot.open(), clock)
+        arm = ReadyArm(robot, robot.open(), clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
-        if coupling is not None and (late := session.slowed(arm.info.lookahead)):
+        if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
             warn(late)
-        reach = session.reach_of(bench.robot, request.robot_model, held)
+        reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(verdict.table(judged), request.quiet)
-        many.refuse_any(judged)
+            tell(preflight_table.table(judged), request.quiet)
+        execution_plan.refuse_any(judged)
         if keeper is None:
             return
         loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
-        provenance.facts.update(session.facts_of(arm, coupling, settings))
+        provenance.facts.update(execution.facts_of(arm, coupling, settings))
         outcome = _stream(loop, provenance, request, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
     if realtime:
-        tell(str(loop.pace), request.quiet)
+        tell(str(loop.timing), request.quiet)
     if loop.pressing is not None:
-        tell(session.pressed(loop.pressing), request.quiet)
+        tell(execution.pressed(loop.pressing), request.quiet)
     stopped = closing or outcome.failure or outcome.signal
     if stopped and keeper.kept:
         name = streams.shown(keeper.output, output=True)
         tell(f"{name}: {len(loop.log)} rows kept", request.quiet)
     if closing is not None and outcome.failure is None:
         raise closing
-    left = many.rest_of(batch, loop.drawn) if many.lifts(batch, settings) else ""
+    left = (
+        execution_plan.rest_of(batch, loop.drawn) if execution_plan.lifts(batch, settings) else ""
+    )
     _end(outcome, request, left)
 
 
 def _warn_of(batch: "Batch", name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
     from dmpcli.commands.messages import warn
+    from dmpcli.control import execution_plan
     from dmpcli.records import marks
-    from dmpcli.streaming import many
 
     if batch.failed:
-        warn(many.passed_over(batch.failed))
+        warn(execution_plan.passed_over(batch.failed))
     mark = marks.of_facts(batch.found[0].facts)
     if mark is not None:
         warn(marks.text(name, mark))
@@ -272,16 +280,16 @@ def _warn_of(batch: "Batch", name: str) -> None:
 def _judged(
     batch: "Batch",
     settings: "ExecuteSettings",
-    arm: "Arm",
+    arm: "ReadyArm",
     reach: "Reach | None",
     request: Request,
-) -> "list[Judged]":
+) -> "list[CheckedPlan]":
     """Plan and check every stroke from where the arm stands."""
     from dmpcli.commands.messages import progress
-    from dmpcli.streaming import many
+    from dmpcli.control import execution_plan
 
     with progress("checking", len(batch.found), request.quiet) as advance:
-        return many.prepare(batch, settings, arm, request.presses, advance, reach)
+        return execution_plan.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
 def _check_output(request: Request, repeatable: bool) -> None:
@@ -311,9 +319,9 @@ def _decoded(tool_file: "Source | None", weighed: bool = True) -> "Tool | None":
 
 
 def _loop(
-    bench: "Bench",
-    arm: "Arm",
-    judged: "list[Judged]",
+    bench: "Workcell",
+    arm: "ReadyArm",
+    judged: "list[CheckedPlan]",
     settings: "ExecuteSettings",
     request: Request,
     coupling: "Filter | None",
@@ -321,23 +329,23 @@ def _loop(
     keeper: "Keeper",
 ) -> "PlanLoop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
+    from dmpcli.control import execution
+    from dmpcli.control.playback import Playback
+    from dmpcli.control.servo_loop import ServoLoop
     from dmpcli.instruments.protocols import PlanPlayer
-    from dmpcli.streaming import session
-    from dmpcli.streaming.loop import Loop
-    from dmpcli.streaming.playback import Playback
 
     touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
-        touch = session.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
-    watch = session.watch(settings)
-    kind = Playback if isinstance(arm.servo, PlanPlayer) else Loop
+        touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+    watch = execution.watch(settings)
+    kind = Playback if isinstance(arm.servo, PlanPlayer) else ServoLoop
     return kind(plans[0], settings.limits, watch, arm, touch, keeper.hindrance, plans[1:])
 
 
-def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
+def _tool(bench: "Workcell", tool_file: "Source | None") -> "Tool":
     tool = _decoded(tool_file)
     if tool is not None:
         return tool
@@ -354,24 +362,23 @@ def _provenance(
     simulated: bool,
 ) -> "Provenance":
     """Return what is known of the run before it is made."""
-    from dmpcli.instruments import urls
+    from dmpcli.control import execution_plan, workcell
     from dmpcli.records.record import Provenance, input_of
-    from dmpcli.streaming import many
 
     inputs = list(batch.entries)
-    changes = request.sensor is not None or not request.robot.startswith(urls.MOCK)
+    changes = request.sensor is not None or not request.robot.startswith(workcell.MOCK)
     if tool_file is not None and changes:
         inputs.append(input_of("tool", tool_file))
     options = settings.model_dump(mode="json")
     options |= {
-        "robot": urls.in_provenance(request.robot),
-        "sensor": urls.in_provenance(request.sensor),
+        "robot": workcell.in_provenance(request.robot),
+        "sensor": workcell.in_provenance(request.sensor),
     }
     options |= {"coupling": "force" if request.presses else None}
     facts: dict[str, Any] = {"simulated": simulated}
-    if many.lifts(batch, settings):
+    if execution_plan.lifts(batch, settings):
         options["id"] = list(request.ids) or None
-        facts |= many.facts_of(batch)
+        facts |= execution_plan.facts_of(batch)
     else:
         options["id"] = batch.found[0].stroke.id
         facts["trajectory"] = batch.found[0].facts
@@ -383,10 +390,10 @@ def _stream(
 ) -> "Outcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.commands.messages import tell
-    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.control import execution
+    from dmpcli.control.servo_loop import Outcome
+    from dmpcli.control.signals import Interruption
     from dmpcli.records.schemas import RUN
-    from dmpcli.streaming import session
-    from dmpcli.streaming.loop import Outcome
 
     outcome = Outcome("a defect of dmpcli")
     with Interruption() as interruption:
@@ -397,7 +404,9 @@ def _stream(
             outcome = loop.run(interruption)
         finally:
             if len(loop.log):
-                keeper.keep(session.record_of(loop, outcome, provenance, realtime), outcome.failure)
+                keeper.keep(
+                    execution.record_of(loop, outcome, provenance, realtime), outcome.failure
+                )
             else:
                 keeper.drop()
     return outcome

@@ -25,11 +25,11 @@ from dmpcli.commands.options import (
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.drag.loop import Ending, Recorder
-    from dmpcli.drag.references import Reference
+    from dmpcli.control.drag_loop import Recorder, RecordingOutcome
     from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.record import Provenance, Record
     from dmpcli.records.streams import Source
+    from dmpcli.simulation.reference_strokes import Reference
 
 _TUTOR = ("reference", "start", "goal", "wave_height", "periods", "seed")
 """Settings of the mock's hand, which mean nothing where a person draws."""
@@ -76,18 +76,18 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     from dmpcli.commands.keeping import Keeper
-    from dmpcli.drag import enter, references, rehearsal
-    from dmpcli.drag.loop import DEFECT, Ending, Recorder
+    from dmpcli.control import keyboard, workcell
+    from dmpcli.control.drag_loop import DEFECT, Recorder, RecordingOutcome
+    from dmpcli.control.signals import Interruption
+    from dmpcli.control.watchdog import watched
     from dmpcli.drag.settings import RecordSettings, check
-    from dmpcli.instruments import urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.interruption import Interruption
-    from dmpcli.instruments.mock import PEN
-    from dmpcli.instruments.watchdog import watched
     from dmpcli.records import settings as layers
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
     from dmpcli.records.schemas import DEMONSTRATION
+    from dmpcli.simulation import reference_strokes, rehearsal
+    from dmpcli.simulation.mock import PEN
 
     given = {
         "drag": drag,
@@ -107,21 +107,21 @@ def command(
     }
     settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
-    addresses = urls.check(robot, sensor, allow_mixed)
-    repeatable = urls.repeatable(addresses)
+    addresses = workcell.check(robot, sensor, allow_mixed)
+    repeatable = workcell.repeatable(addresses)
     _check_tutored(given, all(address.simulated for address in addresses))
-    urls.need_tool(addresses[1], tool is not None)
+    workcell.need_tool(addresses[1], tool is not None)
     realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light", quiet)
     check_output(output, repeatable, force)
     tool_source = streams.read(tool) if tool else None
     held = tool_file.decode(tool_source) if tool_source else None
-    stroke = references.build(settings)
+    stroke = reference_strokes.build(settings)
     keeper = Keeper(output, realtime, quiet)
     keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
-    bench = urls.connect(
+    bench = workcell.connect(
         robot,
         sensor,
         clock,
@@ -134,10 +134,10 @@ def command(
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
     if not realtime and rehearsed.longest == float("inf"):
         raise InputError("--duration: say how long, for in simulated time nobody presses Enter")
-    ending = Ending(DEFECT)
+    ending = RecordingOutcome(DEFECT)
     options = {
-        "robot": urls.in_provenance(robot),
-        "sensor": urls.in_provenance(sensor),
+        "robot": workcell.in_provenance(robot),
+        "sensor": workcell.in_provenance(sensor),
         "realtime": realtime,
     }
     # Beside a real instrument a person draws, and nobody knows what.
@@ -153,7 +153,7 @@ def command(
             settings,
             rehearsed.longest,
             signals,
-            lambda: realtime and enter.pressed(),
+            lambda: realtime and keyboard.pressed(),
             rehearsed.begin,
             rehearsed.lead_in,
             keeper.hindrance,
@@ -171,7 +171,7 @@ def command(
     # What was refused before the first row is one line.
     if len(recorder.log) or ending.failure is None:
         if realtime:
-            tell(str(recorder.pace), quiet)
+            tell(str(recorder.timing), quiet)
         tell(_summary(output, recorder, ending), quiet)
     if ending.failure is not None:
         raise ending.failure
@@ -245,7 +245,7 @@ def _provenance(
 
 
 def _recording(
-    recorder: "Recorder", known: "Provenance", ending: "Ending", realtime: bool
+    recorder: "Recorder", known: "Provenance", ending: "RecordingOutcome", realtime: bool
 ) -> "Record":
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     from dataclasses import replace
@@ -253,13 +253,13 @@ def _recording(
     from dmpcli.records.record import Record
     from dmpcli.records.schemas import DEMONSTRATION
 
-    facts = known.facts | {"ended": ending.reason} | (recorder.pace.facts() if realtime else {})
+    facts = known.facts | {"ended": ending.reason} | (recorder.timing.facts() if realtime else {})
     if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 
 
-def _summary(output: str, recorder: "Recorder", ending: "Ending") -> str:
+def _summary(output: str, recorder: "Recorder", ending: "RecordingOutcome") -> str:
     endings = {
         "duration": "its time was over",
         "rest": "the tool came to rest",

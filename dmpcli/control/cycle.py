@@ -17,20 +17,20 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dmpcli.arrays import Floats
+from dmpcli.control import guards
+from dmpcli.control.guards import FollowingErrorMonitor
+from dmpcli.control.loop_timing import LoopTiming, undisturbed
+from dmpcli.control.settling import SettlingDetector
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
-from dmpcli.instruments import guards
-from dmpcli.instruments.guards import Trail
-from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.pace import Pace, undisturbed
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
-from dmpcli.instruments.rest import Rest
-from dmpcli.streaming.limits import Box
+from dmpcli.planning.limits import Box
 
 Pose = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True)
-class Arm:
+class ReadyArm:
     """A robot that stands ready, and the clock it runs on."""
 
     servo: Servo
@@ -39,7 +39,7 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Watch:
+class StopLimits:
     """When the loop stops by itself.
 
     Attributes
@@ -56,7 +56,7 @@ class Watch:
     torque: float
 
 
-class ForceInput(Protocol):
+class WrenchSource(Protocol):
     """What a loop feels with."""
 
     def feel(self, state: RobotState, now: float) -> Floats | None:
@@ -105,7 +105,7 @@ class ControlLoop(ABC):
     ----------
     period : float
         s.
-    watch : Watch
+    watch : StopLimits
     workspace : Box or None
         Which the tool must not leave.
     streams : bool
@@ -115,29 +115,31 @@ class ControlLoop(ABC):
 
     Attributes
     ----------
-    pace : Pace
+    pace : LoopTiming
     """
 
     def __init__(
         self,
         period: float,
-        watch: Watch,
+        watch: StopLimits,
         workspace: Box | None,
         streams: bool,
         hindrance: Callable[[], DmpError | None],
     ) -> None:
-        self.pace = Pace()
+        self.timing = LoopTiming()
         self._period, self._watch, self._workspace = period, watch, workspace
         self._streams, self._hindrance = streams, hindrance
         self._interruption = Interruption()
         self._begin = 0.0
         self._last: Pose | None = None  # what the arm was led to last
 
-    def _take(self, arm: Arm, force: ForceInput | None) -> None:
+    def _take(self, arm: ReadyArm, force: WrenchSource | None) -> None:
         """Take the instruments: an arm that is not yet in servo mode, and what it feels with."""
         self._arm, self._force = arm, force
-        watch, self._rest = self._watch, Rest(arm.info, self._period)
-        self._trail = Trail(arm.info, self._period, watch.following_error, watch.following_angle)
+        watch, self._rest = self._watch, SettlingDetector(arm.info, self._period)
+        self._trail = FollowingErrorMonitor(
+            arm.info, self._period, watch.following_error, watch.following_angle
+        )
 
     def _run(self) -> tuple[str, DmpError | None]:
         """Run to the end, and stop the arm.
@@ -196,7 +198,7 @@ class ControlLoop(ABC):
             self._took(setpoint, taken)
             if not self._goes_on(cycle):
                 return
-            self.pace.add(begin + cycle.due, cycle.woke, sent, clock.now())
+            self.timing.add(begin + cycle.due, cycle.woke, sent, clock.now())
 
     def _wake(self, number: int) -> Cycle:
         """Wait for a deadline; return the cycle, with what the arm says of itself."""
@@ -205,7 +207,7 @@ class ControlLoop(ABC):
         woke = clock.now()
         late = max(woke - self._begin - due, 0.0)  # rounding may say earlier
         missed = int(late / period) if late > period else 0
-        self.pace.missed += missed
+        self.timing.missed += missed
         if not self._streams:
             past = late - missed * period
             due, late = due + late - past, past

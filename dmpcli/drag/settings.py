@@ -6,9 +6,9 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
+from dmpcli.planning.limits import ordered
 from dmpcli.primitives.admittance import Bounds, Law, check_stable
 from dmpcli.records.settings import Settings
-from dmpcli.streaming.limits import ordered
 
 # Wide enough for any tool, and no product of two of them overflows.
 Coefficient = Annotated[float, Field(ge=-1e9, le=1e9)]

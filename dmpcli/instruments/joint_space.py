@@ -12,7 +12,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import RefusedError
 from dmpcli.instruments import pose_forms
-from dmpcli.instruments.drivers import DriverInfo, Orientation
+from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.instruments.pose_forms import Pose
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm

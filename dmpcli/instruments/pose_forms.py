@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.instruments.drivers import DriverInfo, Orientation
+from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
 
 METRE = 1000.0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dmpcli.errors import InputError
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.drivers import ServoDriver
+from dmpcli.instruments.driver_protocol import ServoDriver
 from dmpcli.instruments.protocols import Clock, Sensor
 
 if TYPE_CHECKING:

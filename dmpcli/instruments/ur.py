@@ -23,7 +23,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import sockets
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.drivers import DriverInfo, DriverState
+from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
 from dmpcli.instruments.options import Options
 from dmpcli.instruments.protocols import Clock, RobotMode
 

@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
+from dmpcli.planning.limits import Limits, ordered
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law
 from dmpcli.records.settings import Settings
-from dmpcli.streaming.limits import Limits, ordered
 
 # No product of two of them overflows.
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmpcli.control.cycle import Arm, Watch
-from dmpcli.drag.loop import Recorder
+from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.drag_loop import Recorder
+from dmpcli.control.servo_loop import ServoLoop
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.instruments.interruption import Interruption
-from dmpcli.streaming.limits import Limits
-from dmpcli.streaming.loop import Loop
-from dmpcli.streaming.plan import Stroke, make
-from tests.drag.drag_fakes import FakeSensor, FakeServo, drag_settings
-from tests.drag.test_loop import WEIGHTLESS
+from dmpcli.planning.limits import Limits
+from dmpcli.planning.plan import Stroke, make
+from tests.control.drag_fakes import FakeSensor, FakeServo, drag_settings
+from tests.control.test_drag_loop import WEIGHTLESS
 
 PERIOD, LOOKAHEAD = 0.02, 0.1
 AT = 1.0
@@ -60,8 +60,8 @@ def executed(stall, asleep):
     still = Stroke("0", t, np.column_stack([x, 0 * x, 0 * x]), None)
     limits = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
     plan = make(still, PERIOD, 1.0, limits, (servo.position, servo.rotation), 20.0)
-    arm = Arm(servo, servo.open(), clock)
-    loop = Loop(plan, limits, Watch(50.0, 0.1, 50.0, 5.0), arm)
+    arm = ReadyArm(servo, servo.open(), clock)
+    loop = ServoLoop(plan, limits, StopLimits(50.0, 0.1, 50.0, 5.0), arm)
     return loop, loop.run(Interruption()).failure
 
 
@@ -72,7 +72,7 @@ def test_a_stall_ends_both_loops_or_neither_and_they_miss_as_many_deadlines(stal
     assert type(failed) is type(other_failed)
     assert isinstance(failed, RefusedError) == (stall > LOOKAHEAD / 2.0)
     assert str(failed) == str(other_failed)
-    assert one.pace.missed == other.pace.missed == int(stall / PERIOD)
+    assert one.timing.missed == other.timing.missed == int(stall / PERIOD)
 
 
 @pytest.mark.parametrize(
@@ -99,5 +99,5 @@ def test_an_arm_that_is_dragged_by_its_own_teaching_waits_for_nobody():
     sensor_tool = replace(WEIGHTLESS)
     loop = Recorder(servo, sensor, clock, sensor_tool, settings, 3.0)
     assert loop.run().reason == "duration"
-    assert loop.pace.missed == 26
+    assert loop.timing.missed == 26
     assert servo.sent == []

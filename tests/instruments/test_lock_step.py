@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
+from dmpcli.control import workcell
 from dmpcli.errors import InputError
-from dmpcli.instruments import urls
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.records import record, schemas, streams
 from dmpcli.records.record import Provenance, Record
@@ -101,16 +101,16 @@ def test_a_contact_bench_needs_no_real_time_and_gives_the_same_bytes_again(
 
 
 def test_what_is_not_in_lock_step_beside_it_needs_real_time(spring):
-    addresses = urls.check(ARM, SENSOR)
-    assert urls.repeatable(addresses)
-    assert urls.repeatable([addresses[0], urls.parse("mock:", "sensor")])
-    assert not urls.repeatable(urls.check(ARM, "netft://h"))
-    bench = urls.connect(ARM, SENSOR, SimulatedClock())
+    addresses = workcell.check(ARM, SENSOR)
+    assert workcell.repeatable(addresses)
+    assert workcell.repeatable([addresses[0], workcell.parse("mock:", "sensor")])
+    assert not workcell.repeatable(workcell.check(ARM, "netft://h"))
+    bench = workcell.connect(ARM, SENSOR, SimulatedClock())
     assert (bench.lab, bench.simulated, bench.lock_step) == (None, True, True)
-    bench = urls.connect(ARM, "netft://h", SimulatedClock())
+    bench = workcell.connect(ARM, "netft://h", SimulatedClock())
     assert (bench.simulated, bench.lock_step) == (True, False)
     with pytest.raises(InputError, match="--allow-mixed"):
-        urls.check(ARM, "mock:")
+        workcell.check(ARM, "mock:")
 
 
 def test_a_recording_of_it_needs_its_duration_and_has_no_hand_of_ours(spring, tool, tmp_path):
