@@ -24,10 +24,10 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.commands.keeping import Keeper
-    from dmpcli.control.cycle import ReadyArm
+    from dmpcli.control.cycle import LoopOutcome, ReadyArm
     from dmpcli.control.execution_plan import CheckedPlan
-    from dmpcli.control.plan_loop import Outcome, PlanLoop
-    from dmpcli.control.stroke_file import Batch
+    from dmpcli.control.servo_loop import PlanLoop
+    from dmpcli.control.stroke_file import StrokeSelection
     from dmpcli.control.workcell import Workcell
     from dmpcli.primitives.coupling import Filter
     from dmpcli.primitives.reach import Reach
@@ -264,7 +264,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     _end(outcome, request, left)
 
 
-def _warn_of(batch: "Batch", name: str) -> None:
+def _warn_of(batch: "StrokeSelection", name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
     from dmpcli.commands.messages import warn
     from dmpcli.control import execution_plan
@@ -278,7 +278,7 @@ def _warn_of(batch: "Batch", name: str) -> None:
 
 
 def _judged(
-    batch: "Batch",
+    batch: "StrokeSelection",
     settings: "ExecuteSettings",
     arm: "ReadyArm",
     reach: "Reach | None",
@@ -357,7 +357,7 @@ def _tool(bench: "Workcell", tool_file: "Source | None") -> "Tool":
 def _provenance(
     settings: "ExecuteSettings",
     request: Request,
-    batch: "Batch",
+    batch: "StrokeSelection",
     tool_file: "Source | None",
     simulated: bool,
 ) -> "Provenance":
@@ -387,15 +387,15 @@ def _provenance(
 
 def _stream(
     loop: "PlanLoop", provenance: "Provenance", request: Request, realtime: bool, keeper: "Keeper"
-) -> "Outcome":
+) -> "LoopOutcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.commands.messages import tell
     from dmpcli.control import execution
-    from dmpcli.control.servo_loop import Outcome
+    from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.signals import Interruption
     from dmpcli.records.schemas import RUN
 
-    outcome = Outcome("a defect of dmpcli")
+    outcome = LoopOutcome("a defect of dmpcli")
     with Interruption() as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
@@ -412,7 +412,7 @@ def _stream(
     return outcome
 
 
-def _end(outcome: "Outcome", request: Request, left: str) -> None:
+def _end(outcome: "LoopOutcome", request: Request, left: str) -> None:
     """Say how the run ended, with the exit code that it earns, and which strokes are left."""
     from dmpcli.commands.messages import tell, warn
 

@@ -25,7 +25,8 @@ from dmpcli.commands.options import (
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.control.drag_loop import Recorder, RecordingOutcome
+    from dmpcli.control.cycle import LoopOutcome
+    from dmpcli.control.drag_loop import Recorder
     from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.record import Provenance, Record
     from dmpcli.records.streams import Source
@@ -77,7 +78,8 @@ def command(
     """Record one stroke that a hand drags the tool along."""
     from dmpcli.commands.keeping import Keeper
     from dmpcli.control import keyboard, workcell
-    from dmpcli.control.drag_loop import DEFECT, Recorder, RecordingOutcome
+    from dmpcli.control.cycle import LoopOutcome
+    from dmpcli.control.drag_loop import DEFECT, Recorder
     from dmpcli.control.signals import Interruption
     from dmpcli.control.watchdog import watched
     from dmpcli.drag.settings import RecordSettings, check
@@ -134,7 +136,7 @@ def command(
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
     if not realtime and rehearsed.longest == float("inf"):
         raise InputError("--duration: say how long, for in simulated time nobody presses Enter")
-    ending = RecordingOutcome(DEFECT)
+    ending = LoopOutcome(DEFECT)
     options = {
         "robot": workcell.in_provenance(robot),
         "sensor": workcell.in_provenance(sensor),
@@ -245,7 +247,7 @@ def _provenance(
 
 
 def _recording(
-    recorder: "Recorder", known: "Provenance", ending: "RecordingOutcome", realtime: bool
+    recorder: "Recorder", known: "Provenance", ending: "LoopOutcome", realtime: bool
 ) -> "Record":
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     from dataclasses import replace
@@ -259,7 +261,7 @@ def _recording(
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 
 
-def _summary(output: str, recorder: "Recorder", ending: "RecordingOutcome") -> str:
+def _summary(output: str, recorder: "Recorder", ending: "LoopOutcome") -> str:
     endings = {
         "duration": "its time was over",
         "rest": "the tool came to rest",

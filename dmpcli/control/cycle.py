@@ -11,6 +11,7 @@ plan, or is dragged by its own teaching) waits for nobody: its cycle is that of 
 Whatever ends a loop, the arm is stopped and the log is there.
 """
 
+import signal
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -94,6 +95,31 @@ class Cycle:
     wrench: Floats | None = None
 
 
+@dataclass(frozen=True)
+class LoopOutcome:
+    """How a loop ended.
+
+    Attributes
+    ----------
+    reason : str
+        How a run ends that nothing stopped, why it was stopped, or what failed.
+    failure : DmpError or None
+        What the command shall end with once all is kept.
+    signal : int or None
+        The signal that stopped it.
+    """
+
+    reason: str
+    failure: DmpError | None = None
+    signal: int | None = None
+
+    def unless(self, failure: DmpError | None) -> "LoopOutcome":
+        """Return an outcome with this failure; the first one that came is the one told."""
+        if failure is None or self.failure is not None:
+            return self
+        return LoopOutcome(str(failure), failure)
+
+
 class StoppedAtOnce(Exception):  # noqa: N818
     """A signal that leaves no time to come to rest; the text says how it ended."""
 
@@ -165,6 +191,15 @@ class ControlLoop(ABC):
             # Also on a defect of ours: nothing may leave the arm moving.
             stopping = guards.leave(self._arm.servo.stop)
         return how, failure or stopping
+
+    def _outcome(self, how: str, failure: DmpError | None, ended: str) -> LoopOutcome:
+        """Put together how it ended, from what `_run` returns and the end that nothing forced."""
+        number = self._interruption.number
+        if failure is not None:
+            return LoopOutcome(str(failure), failure)
+        if number is None or not how:
+            return LoopOutcome(ended)
+        return LoopOutcome(f"{signal.Signals(number).name}: {how}", None, number)
 
     def _heed(self) -> None:
         """Begin nothing that is not wanted any more."""

@@ -4,15 +4,20 @@ It stops by itself where going on would not be safe: a silent or saturated senso
 not ready, refuses a set-point, does not follow or leaves the workspace, a loop that is late.
 """
 
-import signal
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
-from dmpcli.control.cycle import ControlLoop, Cycle, ReadyArm, StopLimits, StoppedAtOnce
+from dmpcli.control.cycle import (
+    ControlLoop,
+    Cycle,
+    LoopOutcome,
+    ReadyArm,
+    StopLimits,
+    StoppedAtOnce,
+)
 from dmpcli.control.cycle import Pose as Led
 from dmpcli.control.demonstration_log import DemonstrationLog
 from dmpcli.control.force_sensing import Sensing
@@ -42,28 +47,6 @@ MOVED = 2.0
 """mm: a tool that has been further than this from where it began has moved."""
 
 DEFECT = "a defect of dmpcli"
-
-
-@dataclass(frozen=True)
-class RecordingOutcome:
-    """Why a recording ended.
-
-    Attributes
-    ----------
-    reason : str
-        ``duration``, ``rest``, ``asked``, the signal that came, or what failed.
-    failure : DmpError or None
-        What the command shall end with once the recording is kept.
-    """
-
-    reason: str
-    failure: DmpError | None = None
-
-    def unless(self, failure: DmpError | None) -> "RecordingOutcome":
-        """Return an ending with this failure; the first one that came is the one told."""
-        if failure is None or self.failure is not None:
-            return self
-        return replace(self, reason=str(failure), failure=failure)
 
 
 class HandForce:
@@ -161,12 +144,12 @@ class Recorder(ControlLoop):
         self._ended = ""
         self.log = DemonstrationLog(referred=led)
 
-    def run(self) -> RecordingOutcome:
+    def run(self) -> LoopOutcome:
         """Record until the end; the instruments are closed after.
 
         Returns
         -------
-        RecordingOutcome
+        LoopOutcome
             A failure while running is in it, not raised, so that `log` can be kept.
 
         Raises
@@ -192,7 +175,8 @@ class Recorder(ControlLoop):
             state = self._robot.state()
             guards.check_state(state, self._settings.workspace)
             self._take(ReadyArm(self._robot, servo, self._clock), self._zeroed(state))
-            ending = self._ending(*self._run())
+            how, failure = self._run()
+            ending = self._outcome(how or "stopped after braking to rest", failure, self._ended)
         finally:
             closing = guards.leave(self._robot.close, self._sensor.close)
         return ending.unless(closing)
@@ -215,16 +199,6 @@ class Recorder(ControlLoop):
         tool = sensing.zeroed(self._tool, state.rotation, s.bias_time, s.tool_check)
         self._sensing, self._hand = sensing, HandForce(sensing, tool, s)
         return self._hand
-
-    def _ending(self, how: str, failure: DmpError | None) -> RecordingOutcome:
-        if failure is not None:
-            return RecordingOutcome(str(failure), failure)
-        number = self._interruption.number
-        if number is None:
-            return RecordingOutcome(self._ended)
-        return RecordingOutcome(
-            f"{signal.Signals(number).name}: {how or 'stopped after braking to rest'}"
-        )
 
     def _enter(self) -> None:
         """Hand the arm over to its own drag teaching, or lead it from where it is then."""

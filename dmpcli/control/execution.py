@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 
 from dmpcli.control import guards
-from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import LONG, ForceInput, ForceTracker
-from dmpcli.control.plan_loop import DONE, Outcome, PlanLoop
-from dmpcli.control.stroke_file import Batch
+from dmpcli.control.servo_loop import DONE, PlanLoop
+from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.errors import InputError
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
-from dmpcli.instruments.servo_adapter import PoseServo
 from dmpcli.kinematics import models
 from dmpcli.measures.contact import contact
 from dmpcli.planning import plan as planning
@@ -122,7 +121,7 @@ def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None
     InputError
         The model is not known, or is not the robot's.
     """
-    own = robot.reach if isinstance(robot, PoseServo) else None
+    own: Reach | None = getattr(robot, "reach", None)  # a servo that is driven by poses has none
     if model is None or own is None:
         return own if model is None else Reach(models.model(model), tool)
     if own.arm is not models.model(model):
@@ -194,7 +193,7 @@ def coupling_filter(stroke: Stroke, facts: Mapping[str, Any], settings: ExecuteS
     return fast_filter(tau / settings.speed, settings.period)
 
 
-def coupling_of(batch: Batch, settings: ExecuteSettings) -> Filter:
+def coupling_of(batch: StrokeSelection, settings: ExecuteSettings) -> Filter:
     """Return the filter for all strokes of a run: their time constants differ in no case.
 
     Raises
@@ -247,14 +246,16 @@ def watch(settings: ExecuteSettings) -> StopLimits:
     )
 
 
-def record_of(loop: PlanLoop, outcome: Outcome, provenance: Provenance, realtime: bool) -> Record:
+def record_of(
+    loop: PlanLoop, outcome: LoopOutcome, provenance: Provenance, realtime: bool
+) -> Record:
     """Return the run as a record.
 
     Parameters
     ----------
     loop : PlanLoop
         Has run, at least one cycle.
-    outcome : Outcome
+    outcome : LoopOutcome
     provenance : Provenance
         What was known before.
     realtime : bool

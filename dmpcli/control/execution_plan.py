@@ -8,7 +8,7 @@ import numpy as np
 
 from dmpcli.control import execution, guards
 from dmpcli.control.cycle import ReadyArm
-from dmpcli.control.stroke_file import Batch, Found, listed
+from dmpcli.control.stroke_file import FoundStroke, StrokeSelection, listed
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight, transfers
@@ -45,7 +45,7 @@ class CheckedPlan:
         return next((check for check in self.checks if not check.passed), None)
 
 
-def lifts(batch: Batch, settings: ExecuteSettings) -> bool:
+def lifts(batch: StrokeSelection, settings: ExecuteSettings) -> bool:
     """Tell whether the pen is to be lifted: for a batch, for several strokes, or as asked.
 
     The single stroke of a file ends where it ends, and the pen stays there.
@@ -87,7 +87,7 @@ def ways(settings: ExecuteSettings, lookahead: float, presses: bool) -> Transfer
 
 
 def prepare(
-    batch: Batch,
+    batch: StrokeSelection,
     settings: ExecuteSettings,
     arm: ReadyArm,
     presses: bool,
@@ -98,7 +98,7 @@ def prepare(
 
     Parameters
     ----------
-    batch : Batch
+    batch : StrokeSelection
     settings : ExecuteSettings
     arm : ReadyArm
     presses : bool
@@ -160,12 +160,12 @@ def refuse_any(judged: Sequence[CheckedPlan]) -> None:
     raise RefusedError(f"stroke {bad[0].plan.id}: {bad[0].failure}{others}")
 
 
-def facts_of(batch: Batch) -> dict[str, Any]:
+def facts_of(batch: StrokeSelection) -> dict[str, Any]:
     """Return what a run file says of its strokes before any is drawn.
 
     Parameters
     ----------
-    batch : Batch
+    batch : StrokeSelection
 
     Returns
     -------
@@ -183,17 +183,17 @@ def facts_of(batch: Batch) -> dict[str, Any]:
     }
 
 
-def _known(found: Found, keys: Sequence[str]) -> dict[str, Any]:
+def _known(found: FoundStroke, keys: Sequence[str]) -> dict[str, Any]:
     said = {key: found.facts[key] for key in keys if found.facts.get(key) is not None}
     return {"id": found.stroke.id} | said
 
 
-def rest_of(batch: Batch, drawn: Sequence[str]) -> str:
+def rest_of(batch: StrokeSelection, drawn: Sequence[str]) -> str:
     """Say how many strokes are drawn and how to draw the rest; bounded.
 
     Parameters
     ----------
-    batch : Batch
+    batch : StrokeSelection
     drawn : sequence of str
         Those that are whole.
     """

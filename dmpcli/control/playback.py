@@ -14,7 +14,7 @@ import numpy as np
 from dmpcli.control.cycle import Cycle, ReadyArm, StopLimits, StoppedAtOnce
 from dmpcli.control.force_tracking import ForceInput
 from dmpcli.control.guards import FollowingErrorMonitor
-from dmpcli.control.plan_loop import PlanLoop
+from dmpcli.control.servo_loop import PlanLoop
 from dmpcli.errors import DmpError, InputError
 from dmpcli.instruments.protocols import PlanPlayer
 from dmpcli.planning.limits import Limits

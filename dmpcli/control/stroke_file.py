@@ -21,7 +21,7 @@ NAMED = 5
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundStroke:
     """A stroke and what its file says beside it.
 
     Attributes
@@ -36,12 +36,12 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Batch:
+class StrokeSelection:
     """The strokes that are to be executed.
 
     Attributes
     ----------
-    found : tuple of Found
+    found : tuple of FoundStroke
         In the order in which they are drawn; at least one.
     failed : dict of str
         Pairs of the batch without trajectory that were passed over, and why each has none.
@@ -51,7 +51,7 @@ class Batch:
         Whether it is a batch's folder.
     """
 
-    found: tuple[Found, ...]
+    found: tuple[FoundStroke, ...]
     failed: dict[str, str]
     entries: tuple[dict[str, str], ...]
     folder: bool
@@ -62,7 +62,7 @@ class Batch:
         return [found.stroke for found in self.found]
 
 
-def find(path: str, wanted: Sequence[str] = ()) -> Batch:
+def find(path: str, wanted: Sequence[str] = ()) -> StrokeSelection:
     """Read the strokes that are to be executed.
 
     Parameters
@@ -86,10 +86,10 @@ def find(path: str, wanted: Sequence[str] = ()) -> Batch:
     source, rows = _grouped(path)
     names = _chosen(wanted, list(rows), source.name)
     found = tuple(_found(source, name, rows[name], {}) for name in names)
-    return Batch(found, {}, (record.input_of("trajectory", source),), False)
+    return StrokeSelection(found, {}, (record.input_of("trajectory", source),), False)
 
 
-def _in_folder(folder: Path, wanted: Sequence[str]) -> Batch:
+def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
     pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
     ids = [str(name) for name in pairs.columns["id"]]
     parts = pairs.columns.get("part", np.full(len(pairs), None))
@@ -123,7 +123,7 @@ def _in_folder(folder: Path, wanted: Sequence[str]) -> Batch:
                 )
             found[name] = _found(source, name, rows[name], _pair_facts(pairs, rows_of[name]))
     strokes = tuple(found[name] for name in names)
-    return Batch(strokes, {} if wanted else failed, tuple(entries), True)
+    return StrokeSelection(strokes, {} if wanted else failed, tuple(entries), True)
 
 
 def _chosen(wanted: Sequence[str], known: Sequence[str], path: str) -> list[str]:
@@ -163,7 +163,7 @@ def _grouped(path: str) -> tuple[Record, dict[str, Integers]]:
     return source, {name: np.concatenate(rows) for name, rows in runs.items()}
 
 
-def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> Found:
+def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> FoundStroke:
     facts = dict(source.provenance.facts) | dict(more)
     t = source.t[rows]
     if len(t) < 2:
@@ -184,7 +184,7 @@ def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -
         _normals(source, rows, facts),
         int(rows[0]) + 1,
     )
-    return Found(stroke, facts)
+    return FoundStroke(stroke, facts)
 
 
 def _optional(source: Record, names: tuple[str, ...], rows: Any) -> Floats | None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dmpcli.errors import InputError, InstrumentError
-from dmpcli.instruments import registry, servo_adapter
+from dmpcli.instruments import registry
 from dmpcli.instruments.address import MOCK, Address, in_provenance, need_tool, split
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo, Servo
 from dmpcli.primitives.wrench import Tool
@@ -111,7 +111,7 @@ def repeatable(addresses: Iterable[Address]) -> bool:
     ----------
     addresses : iterable of Address
     """
-    return all(registry.lock_step(address) for address in addresses)
+    return all(address.simulated or registry.lock_step(address) for address in addresses)
 
 
 def check(robot: str, sensor: str | None = MOCK, allow_mixed: bool = False) -> tuple[Address, ...]:
@@ -197,13 +197,15 @@ def connect(
     if sensor is None and mocks:
         feeler = MockSensor(lab)
     whole = len(mocks) == len(addresses)
-    steps = [registry.lock_step(address) for address in addresses]
+    steps = [repeatable([address]) for address in addresses]
     return Workcell(arm, feeler, lab if whole else None, any(steps), all(steps), note)
 
 
 def _robot(address: Address, lab: Lab, clock: Clock, tool: Tool | None) -> tuple[Servo, str | None]:
     if address.simulated:
         return MockServo(lab), None
+    from dmpcli.instruments import servo_adapter  # a rehearsal starts sooner without
+
     driver = registry.robot_factory(address.scheme)(address, clock)
     untold = f"{address}: no --tool FILE, so the TCP is the flange or what the robot takes for it"
     return servo_adapter.servo(driver, clock, tool), untold if tool is None else None

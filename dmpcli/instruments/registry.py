@@ -7,18 +7,19 @@ their own: their world goes on as far as the clock that they are given, real or 
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dmpcli.errors import InputError
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.driver_protocol import ServoDriver
 from dmpcli.instruments.protocols import Clock, Sensor
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
 
+    from dmpcli.instruments.driver_protocol import ServoDriver
+
 SensorFactory = Callable[[Address, Clock], Sensor]
-RobotFactory = Callable[[Address, Clock], ServoDriver]
+RobotFactory: TypeAlias = "Callable[[Address, Clock], ServoDriver]"
 
 GROUPS = {"sensor": "dmpcli.sensors", "robot": "dmpcli.robots"}
 """Entry-point group of each role."""
@@ -60,16 +61,14 @@ def robot_factory(scheme: str) -> RobotFactory:
 
 
 def lock_step(address: Address) -> bool:
-    """Tell whether an instrument keeps to whatever clock it is given: the mock, and who says so.
+    """Tell whether an instrument keeps to whatever clock it is given: its factory says so.
 
     Raises
     ------
     InputError
         Its driver cannot be had.
     """
-    return address.simulated or bool(
-        getattr(_load(address.role, address.scheme), "lock_step", False)
-    )
+    return bool(getattr(_load(address.role, address.scheme), "lock_step", False))
 
 
 def _installed(role: str) -> "EntryPoints":

@@ -5,7 +5,7 @@ import pytest
 
 from dmpcli.control import execution_plan
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.stroke_file import Batch, Found
+from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning.plan import Stroke
 from dmpcli.planning.preflight import Check
@@ -15,8 +15,10 @@ from tests.control.streaming_fakes import plan, stroke
 
 def batch(*names, folder=True):
     t, position = np.arange(3.0), np.zeros((3, 3))
-    found = [Found(Stroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]}) for name in names]
-    return Batch(tuple(found), {}, (), folder)
+    found = [
+        FoundStroke(Stroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]}) for name in names
+    ]
+    return StrokeSelection(tuple(found), {}, (), folder)
 
 
 def test_what_is_left_is_named_as_the_options_that_draw_it():

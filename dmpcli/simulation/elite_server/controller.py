@@ -11,7 +11,7 @@ from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, inverse
 from dmpcli.simulation.elite_server.behaviour import Behaviour
 from dmpcli.simulation.elite_server.joint_arm import JointArm
-from dmpcli.simulation.elite_server.motions import Path, Transmission, joint_move, line_move
+from dmpcli.simulation.elite_server.motions import JointPath, Transmission, joint_move, line_move
 from dmpcli.simulation.elite_server.parameters import (
     BAD_PARAMS,
     FAILED,
@@ -78,7 +78,7 @@ class SimulatedController:
         self.alarm = ""
         self._transmission: Transmission | None = None
         self._acknowledges = True
-        self._path: Path | None = None
+        self._path: JointPath | None = None
         self._file = TrajectoryFile()
         reads: dict[str, Callable[[Params], Any]] = {
             "getRobotState": lambda _: self.state,
@@ -305,7 +305,7 @@ class SimulatedController:
     def _ready_for_motion(self) -> bool:
         return self.may_move and self._transmission is None and not self._moving
 
-    def _go(self, path: Path) -> None:
+    def _go(self, path: JointPath) -> None:
         self._path = path
         self.arm.feed = path.feed
 
@@ -366,7 +366,7 @@ class SimulatedController:
             if self.habits.policies.jump == "alarm":
                 self.raise_alarm("the trajectory jumps")
             return False
-        self._go(Path(times, joints, self.arm.model.speeds))
+        self._go(JointPath(times, joints, self.arm.model.speeds))
         self._enter()
         return True
 

@@ -22,7 +22,7 @@ from dmpcli.simulation.elite_server.controller import SimulatedController
 from dmpcli.simulation.elite_server.faults import Event
 from dmpcli.simulation.elite_server.joint_arm import LAG, JointArm
 from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
-from dmpcli.simulation.mock.contact import Ground, Wrist, contact
+from dmpcli.simulation.mock.contact import Solid, Wrist, contact
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN, SensorParameters
 
 ROBOT_MODEL = "ec66"
@@ -41,7 +41,7 @@ class Setting:
         Where the TCP is parked, mm.
     tool : Tool
         As it truly is.
-    ground : Ground or None
+    ground : Solid or None
         What the tool may touch.
     sensor : SensorParameters
     habits : Behaviour
@@ -56,7 +56,7 @@ class Setting:
     position: Floats
     rotation: Floats = field(default_factory=lambda: PEN_DOWN.copy())
     tool: Tool = PEN
-    ground: Ground | None = None
+    ground: Solid | None = None
     sensor: SensorParameters = field(default_factory=SensorParameters)
     habits: Behaviour = field(default_factory=Behaviour)
     events: tuple[Event, ...] = ()

@@ -150,7 +150,7 @@ class Transmission:
         return command + self._rate * self._period, self._period
 
 
-class Path:
+class JointPath:
     """Joint angles at times that are known before the motion.
 
     Parameters
@@ -183,7 +183,7 @@ class Path:
         return target, max(duration, way, 1e-6)
 
 
-def joint_move(start: Floats, goal: Floats, speed: Floats, acceleration: Floats) -> Path:
+def joint_move(start: Floats, goal: Floats, speed: Floats, acceleration: Floats) -> JointPath:
     """Move all joints together from rest to rest, trapezoidal in speed.
 
     Parameters
@@ -195,12 +195,12 @@ def joint_move(start: Floats, goal: Floats, speed: Floats, acceleration: Floats)
     """
     way = np.abs(goal - start)
     times, share = trapezoid(_slowest(way, speed), _slowest(way, acceleration))
-    return Path(times, start + share[:, None] * (goal - start), speed)
+    return JointPath(times, start + share[:, None] * (goal - start), speed)
 
 
 def line_move(
     arm: Arm, start: Floats, goal: Floats, speed: float, acceleration: float, turning: bool
-) -> Path:
+) -> JointPath:
     """Move the flange straight from one posture to another, from rest to rest.
 
     Parameters
@@ -227,7 +227,7 @@ def line_move(
     joints = [start]
     for s in share[1:]:
         joints.append(inverse.nearest(arm, p0 + s * (p1 - p0), exp_one(s * turn) @ R0, joints[-1]))
-    return Path(times, np.array(joints), arm.speeds)
+    return JointPath(times, np.array(joints), arm.speeds)
 
 
 def trapezoid(speed: float, acceleration: float) -> tuple[Floats, Floats]:

@@ -24,7 +24,7 @@ class Hand(Protocol):
         """
 
 
-class Ground(Protocol):
+class Solid(Protocol):
     """Something solid that the tool may touch: its shape, and what it is made of."""
 
     @property
@@ -50,14 +50,14 @@ class Ground(Protocol):
         """
 
 
-def contact(ground: Ground | None, position: Floats, velocity: Floats) -> Floats:
+def contact(ground: Solid | None, position: Floats, velocity: Floats) -> Floats:
     """Wrench of the ground on the pen: spring, damper and friction; it pushes, it never pulls.
 
     The pen touches with its tip, which is the TCP: there is no torque about it.
 
     Parameters
     ----------
-    ground : Ground, optional
+    ground : Solid, optional
     position : array, shape (3,)
         Pen tip, mm.
     velocity : array, shape (6,)

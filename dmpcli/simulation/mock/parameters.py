@@ -105,7 +105,7 @@ class Plate:
     sliding: float = 5.0
 
     def under(self, position: Floats) -> tuple[float, Floats]:
-        """Return the depth of a point in the plate, mm, and the normal; see `contact.Ground`."""
+        """Return the depth of a point in the plate, mm, and the normal; see `contact.Solid`."""
         return float(self.normal @ (self.point - position)), self.normal
 
 

@@ -27,7 +27,7 @@ class Pages:
     """
 
     def __init__(self, box: BoxState) -> None:
-        class Handler(BaseHTTPRequestHandler):
+        class PageHandler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
                 status, kind, page = get(box, self.path)
                 body = page.encode()
@@ -40,7 +40,7 @@ class Pages:
             def log_message(self, format: str, *args: object) -> None:  # noqa: A002
                 pass
 
-        self._server = _Server((box.settings.host, box.settings.http_port), Handler)
+        self._server = _PageServer((box.settings.host, box.settings.http_port), PageHandler)
         self.port = int(self._server.server_address[1])
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.05,), name="rdt pages", daemon=True
@@ -54,7 +54,7 @@ class Pages:
         self._thread.join()
 
 
-class _Server(ThreadingHTTPServer):
+class _PageServer(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 

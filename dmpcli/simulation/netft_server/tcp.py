@@ -31,7 +31,7 @@ class BoxTcp:
     """
 
     def __init__(self, box: BoxState) -> None:
-        class Handler(socketserver.BaseRequestHandler):
+        class CommandHandler(socketserver.BaseRequestHandler):
             def handle(self) -> None:
                 with contextlib.suppress(OSError):
                     while True:
@@ -43,7 +43,7 @@ class BoxTcp:
                             command += part
                         self.request.sendall(answer(box, command))
 
-        self._server = _Server((box.settings.host, box.settings.tcp_port), Handler)
+        self._server = _CommandServer((box.settings.host, box.settings.tcp_port), CommandHandler)
         self.port = int(self._server.server_address[1])
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.05,), name="rdt tcp", daemon=True
@@ -57,7 +57,7 @@ class BoxTcp:
         self._thread.join()
 
 
-class _Server(socketserver.ThreadingTCPServer):
+class _CommandServer(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
     block_on_close = False

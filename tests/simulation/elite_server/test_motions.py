@@ -8,7 +8,7 @@ from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
 from dmpcli.simulation.elite_server.motions import (
     DECELERATION,
-    Path,
+    JointPath,
     Policies,
     Transmission,
     joint_move,
@@ -164,7 +164,7 @@ def test_a_trapezoid_goes_from_rest_to_rest_within_its_bounds(speed, acceleratio
     assert times[-1] == pytest.approx(1.0 / min(speed, acceleration**0.5) + ramp)
 
 
-def drive(path: Path, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def drive(path: JointPath, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     times, joints = [0.0], [command]
     while (leg := path.feed(joints[-1])) is not None:
         joints.append(leg[0])
