@@ -6,69 +6,38 @@ checks it against the plan in time, against limits and forces, and logs a row; a
 stop by the controller, at once, for there is no braking along a path that it holds.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from dmpcli.control.cycle import Cycle, ReadyArm, StopLimits, StoppedAtOnce
-from dmpcli.control.force_tracking import ForceInput
+from dmpcli.control.cycle import Cycle, StoppedAtOnce
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.control.servo_loop import PlanLoop
-from dmpcli.errors import DmpError, InputError
 from dmpcli.instruments.protocols import PlanPlayer
-from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Pose
+from dmpcli.planning.plan import Pose
 
 # The controller's clock may run so far ahead of ours by the end of a plan, s.
 _AHEAD = 0.1
 
 
 class Playback(PlanLoop):
-    """Has one plan after the other played.
+    """Has the controller play, whose servo is a `PlanPlayer`; there is no force coupling."""
 
-    Parameters
-    ----------
-    plan, limits, watch, touch, hindrance, then
-        As in `PlanLoop`; without a force coupling.
-    arm : ReadyArm
-        Its servo is a `PlanPlayer`.
-
-    Raises
-    ------
-    InputError
-        There is a force coupling.
-    """
-
-    def __init__(
-        self,
-        plan: Plan,
-        limits: Limits,
-        watch: StopLimits,
-        arm: ReadyArm,
-        touch: ForceInput | None = None,
-        hindrance: Callable[[], DmpError | None] = lambda: None,
-        then: Sequence[Plan] = (),
-    ) -> None:
-        if touch is not None and touch.pressing is not None:
-            raise InputError(
-                "--coupling force: corrects each set-point as it is sent, and this robot plays the "
-                "whole plan by itself; leave mode=file out of --robot"
-            )
-        super().__init__(plan, limits, watch, arm, touch, hindrance, then, streams=False)
-        # What the arm must stay near: where the plan is in time, and a little ahead.
-        info = replace(arm.info, lookahead=arm.info.lookahead + _AHEAD)
-        self._trail = FollowingErrorMonitor(
-            info, plan.period, watch.following_error, watch.following_angle
-        )
-        self._ahead = round(_AHEAD / plan.period)
-        for number in range(self._ahead + 1):
-            self._trail.add(*plan.at(min(number, len(plan) - 1)))
+    STREAMS = False
 
     def _enter(self) -> None:
         """Hand every plan over, then begin, unless something has come up meanwhile."""
         servo, plans = self._arm.servo, [self.plan, *self._then]
         assert isinstance(servo, PlanPlayer)
+        # What the arm must stay near: where the plan is in time, and a little ahead.
+        info, watch = self._arm.info, self._watch
+        info = replace(info, lookahead=info.lookahead + _AHEAD)
+        self._trail = FollowingErrorMonitor(
+            info, self._period, watch.following_error, watch.following_angle
+        )
+        self._ahead = round(_AHEAD / self._period)
+        for number in range(self._ahead + 1):
+            self._trail.add(*self.plan.at(min(number, len(self.plan) - 1)))
         position = np.concatenate([plan.position for plan in plans])
         rotation = np.concatenate([plan.rotation for plan in plans])
         self._meanwhile()

@@ -7,6 +7,7 @@ however late the loop is. Every cycle is logged, the last one too.
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 from dmpcli.control.cycle import (
     ControlLoop,
@@ -21,7 +22,7 @@ from dmpcli.control.plan_cursor import PlanCursor
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.control.signals import Interruption
 from dmpcli.control.step_limits import StepLimits, check_start
-from dmpcli.errors import DmpError, RefusedError
+from dmpcli.errors import DmpError, InputError, RefusedError
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Pose
 
@@ -39,17 +40,17 @@ class PlanLoop(ControlLoop):
     watch : StopLimits
     arm : ReadyArm
         Not yet in servo mode.
-    touch : ForceInput or None
+    touch : ForceInput, optional
         A sensor and, where asked, the force coupling.
-    hindrance : callable
+    hindrance : callable, optional
         Read once a cycle; what it returns ends the run.
     then : sequence of Plan
         What is drawn after `plan`, each from where the one before it rests.
-    streams : bool
-        As in `ControlLoop`.
 
     Attributes
     ----------
+    STREAMS : bool
+        Whether the arm waits for our set-points, as in `ControlLoop`.
     plan : Plan
         The one that is drawn.
     drawn : list of str
@@ -58,7 +59,14 @@ class PlanLoop(ControlLoop):
         The force coupling, where there is one.
     log : RunLog
         One row per cycle; it is there whatever goes wrong.
+
+    Raises
+    ------
+    InputError
+        There is a force coupling, and nobody waits for set-points.
     """
+
+    STREAMS: ClassVar[bool]
 
     def __init__(
         self,
@@ -66,16 +74,20 @@ class PlanLoop(ControlLoop):
         limits: Limits,
         watch: StopLimits,
         arm: ReadyArm,
-        touch: ForceInput | None,
-        hindrance: Callable[[], DmpError | None],
-        then: Sequence[Plan],
-        streams: bool,
+        touch: ForceInput | None = None,
+        hindrance: Callable[[], DmpError | None] = lambda: None,
+        then: Sequence[Plan] = (),
     ) -> None:
-        super().__init__(plan.period, watch, limits.workspace, streams, hindrance)
+        super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
         self.plan, self._then = plan, deque(then)
         self.drawn: list[str] = []
         self.pressing: ForceTracker | None = touch.pressing if touch else None
+        if self.pressing is not None and not self.STREAMS:
+            raise InputError(
+                "--coupling force: corrects each set-point as it is sent, and this robot plays the "
+                "whole plan by itself; leave mode=file out of --robot"
+            )
         self._touch, self._limits = touch, limits
         self._cursor = PlanCursor(plan, limits, wait=self.pressing is not None)
         self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
@@ -182,32 +194,13 @@ class PlanLoop(ControlLoop):
 
 
 class ServoLoop(PlanLoop):
-    """Streams one plan after the other.
+    """Streams: each set-point is sent in its cycle; to brake is to decelerate along the path."""
 
-    Parameters
-    ----------
-    plan, watch, arm
-        As in `PlanLoop`.
-    limits : Limits
-        For the deceleration, and for every set-point that is sent.
-    touch : ForceInput, optional
-    hindrance : callable, optional
-        What it returns decelerates the arm and is what the run ends with.
-    then : sequence of Plan
-    """
+    STREAMS = True
 
-    def __init__(
-        self,
-        plan: Plan,
-        limits: Limits,
-        watch: StopLimits,
-        arm: ReadyArm,
-        touch: ForceInput | None = None,
-        hindrance: Callable[[], DmpError | None] = lambda: None,
-        then: Sequence[Plan] = (),
-    ) -> None:
-        super().__init__(plan, limits, watch, arm, touch, hindrance, then, streams=True)
-        self._steps = StepLimits(limits, plan.period)
+    def _enter(self) -> None:
+        super()._enter()
+        self._steps = StepLimits(self._limits, self._period)
 
     def _brake(self) -> None:
         """Decelerate along the path from now on, if any of it is left."""

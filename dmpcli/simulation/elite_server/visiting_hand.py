@@ -1,13 +1,11 @@
 """Who drags the tool of the virtual lab: a hand that comes when the arm may be dragged."""
 
-from typing import Protocol
-
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.simulation.elite_server.joint_arm import JointArm
 from dmpcli.simulation.elite_server.motions import Transmission
-from dmpcli.simulation.mock import Hand
+from dmpcli.simulation.hand import SimulatedHand
 
 REACH = 3.0
 """mm from the start of its stroke within which the hand takes hold."""
@@ -22,13 +20,6 @@ Longer than a look-ahead and a soft start together.
 _STILL = 1e-4
 
 
-class PractisedHand(Hand, Protocol):
-    """A hand that knows its stroke, such as `dmpcli.simulation.hand.SimulatedHand`."""
-
-    def begin(self, t: float) -> None:
-        """Take hold of the tool at time `t`, s."""
-
-
 class VisitingHand:
     """Draws its stroke whenever it may, so many times.
 
@@ -38,7 +29,7 @@ class VisitingHand:
 
     Parameters
     ----------
-    tutor : PractisedHand
+    tutor : SimulatedHand
     start : array, shape (3,)
         Of its stroke, mm.
     lasts : float
@@ -55,7 +46,7 @@ class VisitingHand:
         Time, s, position, mm, and rotation of the TCP at each reading while it grips.
     """
 
-    def __init__(self, tutor: PractisedHand, start: Floats, lasts: float, strokes: int) -> None:
+    def __init__(self, tutor: SimulatedHand, start: Floats, lasts: float, strokes: int) -> None:
         self._tutor, self._start = tutor, start
         self._lasts, self._strokes = lasts, strokes
         self._spot: Floats | None = None  # joint angles where it stands
