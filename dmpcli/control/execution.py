@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dmpcli.arrays import Floats
 from dmpcli.control import guards
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
@@ -83,13 +84,7 @@ def prepare(
     """
     guards.check_ready(state)
     start = (state.position, state.rotation)
-    goal = stroke.rotation[0] if stroke.rotation is not None else state.rotation
-    checks = preflight.at_rest(stroke, settings.speed, settings.period, settings.limits)
-    if settings.approach is None:
-        distance, angle = planning.gap(start, (stroke.position[0], goal))
-        checks += preflight.near_start(
-            distance, angle, settings.start_tolerance, settings.start_angle
-        )
+    near = standing(stroke, settings, state) if settings.approach is None else []
     made = planning.make(
         stroke,
         settings.period,
@@ -98,11 +93,52 @@ def prepare(
         start,
         settings.approach or settings.lead_speed,
     )
-    checks += preflight.within_limits(made, stroke, settings.limits)
-    if reach is not None:
-        standing = reach.standing(state.joints, *start)
-        checks += preflight.by_joints(made, stroke, reach, standing)[0]
-    return made, checks
+    joints = None if reach is None else reach.standing(state.joints, *start)
+    return made, judge(stroke, made, settings, near, reach, joints)[0]
+
+
+def standing(stroke: Stroke, settings: ExecuteSettings, state: RobotState) -> list[Check]:
+    """Check that the arm stands at a stroke's start."""
+    goal = state.rotation if stroke.rotation is None else stroke.rotation[0]
+    gap = planning.gap((state.position, state.rotation), (stroke.position[0], goal))
+    return preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)
+
+
+def judge(
+    stroke: Stroke,
+    plan: Plan,
+    settings: ExecuteSettings,
+    near: list[Check],
+    reach: Reach | None,
+    joints: Floats | None,
+) -> tuple[list[Check], Floats | None]:
+    """Check one stroke with its ways.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    plan : Plan
+    settings : ExecuteSettings
+    near : list of Check
+        What was found of where the arm stands.
+    reach : Reach or None
+    joints : array, shape (6,), or None
+        Before, rad.
+
+    Returns
+    -------
+    list of Check
+        All of them, failed ones too.
+    array, shape (6,), or None
+        Joint angles after, rad.
+    """
+    s = settings
+    checks = preflight.at_rest(stroke, s.speed, s.period, s.limits) + near
+    checks += preflight.within_limits(plan, stroke, s.limits)
+    if reach is None:
+        return checks, None
+    by_joints, joints = preflight.by_joints(plan, stroke, reach, joints)
+    return checks + by_joints, joints
 
 
 def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None:

@@ -10,8 +10,7 @@ from dmpcli.control import execution, guards
 from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection, listed
 from dmpcli.errors import InputError, RefusedError
-from dmpcli.planning import plan as planning
-from dmpcli.planning import preflight, transfers
+from dmpcli.planning import transfers
 from dmpcli.planning.plan import Plan
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
@@ -120,25 +119,22 @@ def prepare(
         return [CheckedPlan(*execution.prepare(strokes[0], settings, state, reach))]
     between = ways(settings, arm.info.lookahead, presses)
     guards.check_ready(state)
-    start, first, limits = (state.position, state.rotation), strokes[0], settings.limits
-    goal = state.rotation if first.rotation is None else first.rotation[0]
-    gap = planning.gap(start, (first.position[0], goal))
-    standing = preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)
+    start, limits = (state.position, state.rotation), settings.limits
+    standing = execution.standing(strokes[0], settings, state)
     near = all(check.passed for check in standing)
+    if settings.approach is None:
+        standing = [replace(check, remedy=_COME) for check in standing]
+    else:
+        standing = []
     joints = None if reach is None else reach.standing(state.joints, *start)
     judged: list[CheckedPlan] = []
     made = transfers.plans(
         strokes, settings.period, settings.speed, limits, start, near, between, settings.approach
     )
     for stroke, plan in zip(strokes, made, strict=True):
-        checks = preflight.at_rest(stroke, settings.speed, settings.period, limits)
-        if not judged and settings.approach is None:
-            checks += [replace(check, remedy=_COME) for check in standing]
-        checks += preflight.within_limits(plan, stroke, limits)
-        if reach is not None:
-            by_joints, joints = preflight.by_joints(plan, stroke, reach, joints)
-            checks += by_joints
+        checks, joints = execution.judge(stroke, plan, settings, standing, reach, joints)
         judged.append(CheckedPlan(plan, checks))
+        standing = []
         advance(1)
     return judged
 

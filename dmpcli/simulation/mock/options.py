@@ -1,15 +1,16 @@
 """The options of a ``mock:`` URL, and the scene that they arrange."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.rotations import from_euler
-from dmpcli.simulation.mock.parameters import Faults, Plate, Scene
+from dmpcli.simulation.mock.parameters import Plate, Scene
 
 KEYS = {
     "x": "mm, where the TCP stands at the beginning",
@@ -87,47 +88,26 @@ def arranged(scene: Scene, options: Mapping[str, float | None]) -> Scene:
     options : mapping
         By the keys of `KEYS`.
     """
+    given = {key: value for key, value in options.items() if value is not None}
 
-    def number(key: str, otherwise: float) -> float:
-        value = options.get(key)
-        return otherwise if value is None else value
+    def picked(*keys: str) -> dict[str, Any]:
+        return {key: given[key] for key in keys if key in given}
 
-    def each_of(keys: str, otherwise: Floats) -> Floats:
-        each = keys.split()
-        return np.array([number(k, float(o)) for k, o in zip(each, otherwise, strict=True)])
+    def each_of(keys: str, otherwise: Iterable[float]) -> Floats:
+        return np.array([given.get(k, o) for k, o in zip(keys.split(), otherwise, strict=True)])
 
-    rotation = scene.rotation
-    if options.keys() & {"rx", "ry", "rz"}:
+    rotation, plate = scene.rotation, scene.plate
+    if given.keys() & {"rx", "ry", "rz"}:
         # Angles that are not given are those of a pen that points straight down.
-        rotation = from_euler(each_of("rx ry rz", np.array([np.pi, 0.0, 0.0])))
+        rotation = from_euler(each_of("rx ry rz", (np.pi, 0.0, 0.0)))
+    if "plate" in options:
+        plate = Plate(np.array([0.0, 0.0, given["plate"]])) if "plate" in given else None
     return replace(
         scene,
-        position=each_of("x y z", scene.position),
+        position=each_of("x y z", scene.position.tolist()),
         rotation=rotation,
-        plate=_plate(scene.plate, options),
-        servo=replace(
-            scene.servo,
-            lag=number("lag", scene.servo.lag),
-            speed=number("speed", scene.servo.speed),
-        ),
-        faults=Faults(
-            estop_at=number("estop_at", scene.faults.estop_at),
-            silent_at=number("silent_at", scene.faults.silent_at),
-            refuse_at=number("refuse_at", scene.faults.refuse_at),
-        ),
-        seed=int(number("seed", scene.seed)),
-    )
-
-
-def _plate(plate: Plate | None, options: Mapping[str, float | None]) -> Plate | None:
-    if "plate" in options:
-        height = options["plate"]
-        plate = None if height is None else Plate(point=np.array([0.0, 0.0, height]))
-    if plate is None:
-        return None
-    stiffness, friction = options.get("stiffness"), options.get("friction")
-    return replace(
-        plate,
-        stiffness=plate.stiffness if stiffness is None else stiffness,
-        friction=plate.friction if friction is None else friction,
+        plate=plate and replace(plate, **picked("stiffness", "friction")),
+        servo=replace(scene.servo, **picked("lag", "speed")),
+        faults=replace(scene.faults, **picked("estop_at", "silent_at", "refuse_at")),
+        seed=int(given.get("seed", scene.seed)),
     )
