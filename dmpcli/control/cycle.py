@@ -15,6 +15,7 @@ import signal
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol
 
 from dmpcli.arrays import Floats
@@ -60,10 +61,13 @@ class StopLimits:
 class WrenchSource(Protocol):
     """What a loop feels with."""
 
-    def feel(self, state: RobotState, now: float) -> Floats | None:
+    def feel(
+        self, state: RobotState, now: float, force: float = inf, torque: float = inf
+    ) -> Floats | None:
         """Return the wrench on the tool, shape (6,), base axes; None where none is fresh enough.
 
-        InstrumentError where the sensor is silent, or sends what must not be believed.
+        InstrumentError where the sensor is silent, or sends what must not be believed; RefusedError
+        where the tool meets more than `force` or `torque`, N and N·m.
         """
 
 
@@ -256,11 +260,9 @@ class ControlLoop(ABC):
         self._trail.check(cycle.state)
 
     def _feel(self, cycle: Cycle) -> None:
-        if self._force is None:
-            return
-        cycle.wrench = self._force.feel(cycle.state, self._arm.clock.now())
-        if cycle.wrench is not None:
-            guards.check_wrench(cycle.wrench, self._watch.force, self._watch.torque)
+        if self._force is not None:
+            watch, now = self._watch, self._arm.clock.now()
+            cycle.wrench = self._force.feel(cycle.state, now, watch.force, watch.torque)
 
     def _took(self, setpoint: Pose, taken: bool) -> None:
         """Remember what was sent; raise where it was not taken."""

@@ -66,12 +66,14 @@ class HandForce:
         self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
         self._wrench = np.zeros(6)
 
-    def feel(self, state: RobotState, now: float) -> Floats | None:
-        """Take in the new samples; None when the newest is too old to be believed."""
+    def feel(
+        self, state: RobotState, now: float, force: float = np.inf, torque: float = np.inf
+    ) -> Floats | None:
+        """Take in the new samples; see `WrenchSource`."""
         s = self._settings
         for sample in self._sensing.hear(now):
             external = self._compensate(sample.wrench, state.rotation)
-            guards.check_wrench(external, s.max_force, s.max_torque)
+            guards.check_wrench(external, force, torque)
             felt = self._low_pass(external)
             self._wrench = dead_band(felt, s.dead_band_force, s.dead_band_torque)
         return self._wrench if self._sensing.fresh(now) else None

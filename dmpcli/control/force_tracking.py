@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.control import guards
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.plan import Plan
@@ -173,7 +174,9 @@ class ForceInput:
     compensate: Callable[[Floats, Floats], Floats]
     pressing: ForceTracker | None = None
 
-    def feel(self, state: RobotState, now: float) -> Floats | None:
+    def feel(
+        self, state: RobotState, now: float, force: float = np.inf, torque: float = np.inf
+    ) -> Floats | None:
         """Return the mean wrench of the last period or two, or the newest one while it is fresh.
 
         Parameters
@@ -182,6 +185,8 @@ class ForceInput:
             For the tool's rotation.
         now : float
             s, on the loop's clock.
+        force, torque : float
+            The most that the tool may meet, N and N·m.
 
         Returns
         -------
@@ -192,6 +197,8 @@ class ForceInput:
         ------
         InstrumentError
             The sensor is silent, or a sample must not be believed.
+        RefusedError
+            The tool meets more.
         """
         samples = self.sensing.recent(now)
         if not samples:
@@ -200,4 +207,6 @@ class ForceInput:
         sensed = samples[0].wrench
         for sample in samples[1:]:
             sensed = sensed + sample.wrench
-        return self.compensate(sensed / len(samples), state.rotation)
+        wrench = self.compensate(sensed / len(samples), state.rotation)
+        guards.check_wrench(wrench, force, torque)
+        return wrench

@@ -12,7 +12,7 @@ import numpy as np
 from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
-from dmpcli.planning.limits import Box, check_inside
+from dmpcli.planning.limits import Box
 
 LAG = 0.1
 """The actual pose may lag the set-points by this much more than the look-ahead, s."""
@@ -74,6 +74,32 @@ def check_pose(state: RobotState) -> None:
     """
     if not finite(state.position, state.rotation):
         raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
+
+
+def check_inside(position: Floats, box: Box | None, what: str) -> None:
+    """Refuse a position outside the workspace.
+
+    Parameters
+    ----------
+    position : array, shape (3,)
+        mm.
+    box : tuple of float or None
+        None is no bound.
+    what : str
+        Whose position it is, for the message.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if box is None:
+        return
+    for axis, value, low, high in zip("xyz", position.tolist(), box[::2], box[1::2], strict=True):
+        if not low <= value <= high:
+            text = beside(value, low if value < low else high, ".3f")
+            raise RefusedError(
+                f"{what} at {axis} = {text} mm leaves the workspace ({low:g} to {high:g} mm)"
+            )
 
 
 def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:
