@@ -1,1 +1,1 @@
-"""The control cycle under `record`, `execute` and playback."""
+"""The control cycle of `record` and `execute`, its guards, its logs, and what it is put together of."""
