@@ -1,1 +1,1 @@
-"""The control cycle of `record` and `execute`, its guards, its logs, and what it is put together of."""
+"""The control cycle of `record` and `execute`, with its guards, logs and instruments."""

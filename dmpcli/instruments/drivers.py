@@ -2,33 +2,8 @@
 
 import warnings
 
-from dmpcli.instruments.driver_protocol import (
-    AngleUnit,
-    DriverInfo,
-    DriverState,
-    HaltingDriver,
-    InverseDriver,
-    LengthUnit,
-    Orientation,
-    PlanDriver,
-    ServoDriver,
-    Space,
-)
-
-__all__ = [
-    "AngleUnit",
-    "Declaration",
-    "DriverState",
-    "HaltingDriver",
-    "InverseDriver",
-    "LengthUnit",
-    "Orientation",
-    "PlanDriver",
-    "ServoDriver",
-    "Space",
-]
-
-Declaration = DriverInfo
+from dmpcli.instruments.driver_protocol import *  # noqa: F403
+from dmpcli.instruments.driver_protocol import DriverInfo as Declaration  # noqa: F401
 
 warnings.warn(
     "dmpcli.instruments.drivers is dmpcli.instruments.driver_protocol now, and its Declaration "
