@@ -23,24 +23,24 @@ from typing import TypeAlias
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.drag import references, rehearsal
-from dmpcli.drag.loop import Recorder
+from dmpcli.control import execution, workcell
+from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.drag_loop import Recorder
+from dmpcli.control.loop_timing import LoopTiming
+from dmpcli.control.servo_loop import ServoLoop
+from dmpcli.control.signals import Interruption
+from dmpcli.control.watchdog import watched
 from dmpcli.drag.settings import RecordSettings
-from dmpcli.instruments import urls
 from dmpcli.instruments.clock import MonotonicClock
-from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.mock import PEN, Scene
-from dmpcli.instruments.pace import Pace
-from dmpcli.instruments.watchdog import watched
+from dmpcli.planning import plan as planning
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas, streams
 from dmpcli.records import settings as layers
 from dmpcli.records import tool as tool_file
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance
-from dmpcli.streaming import plan as planning
-from dmpcli.streaming import session
-from dmpcli.streaming.loop import Arm, Loop
+from dmpcli.simulation import reference_strokes, rehearsal
+from dmpcli.simulation.mock import PEN, Scene
 from dmpcli.streaming.settings import ExecuteSettings
 
 BLOCKS = 3
@@ -69,7 +69,7 @@ class Metered(MonotonicClock):
         self._woke = time.thread_time()
 
 
-Measured: TypeAlias = tuple[Pace, list[float]]
+Measured: TypeAlias = tuple[LoopTiming, list[float]]
 """When cycles woke, sent and ended, and what each computed, s of processor time."""
 
 
@@ -81,9 +81,9 @@ class Place:
     sensor: str
     tool: Tool
 
-    def connect(self, clock: MonotonicClock, scene: Scene) -> urls.Bench:
+    def connect(self, clock: MonotonicClock, scene: Scene) -> workcell.Workcell:
         """Connect to them; the scene is a mock's."""
-        return urls.connect(self.robot, self.sensor, clock, scene=scene, tool=self.tool)
+        return workcell.connect(self.robot, self.sensor, clock, scene=scene, tool=self.tool)
 
 
 def bare(period: float, duration: float) -> tuple[Floats, int]:
@@ -112,7 +112,7 @@ def recording(period: float, duration: float, folder: Path, at: Place) -> Measur
         "following_angle": 1.0,
     }
     settings = layers.resolve(RecordSettings, "record", given, "drag")
-    stroke, clock = references.build(settings), Metered()
+    stroke, clock = reference_strokes.build(settings), Metered()
     bench = at.connect(clock, rehearsal.scene(stroke, settings))
     tutored = rehearsal.rehearse(bench.lab, stroke, settings)
     recorder = Recorder(
@@ -132,10 +132,10 @@ def recording(period: float, duration: float, folder: Path, at: Place) -> Measur
     journal.discard()
     if ending.failure is not None:
         print(f"  ended early: {ending.reason}")
-    return recorder.pace, clock.computed
+    return recorder.timing, clock.computed
 
 
-def execution(period: float, duration: float, folder: Path, at: Place) -> Measured:
+def executing(period: float, duration: float, folder: Path, at: Place) -> Measured:
     """Run the loop of `execute` on the real clock, with sensor, watchdog and journal."""
     settings = layers.resolve(ExecuteSettings, "execute", {"period": period}, None)
     t = np.arange(round(duration * 100.0) + 1) / 100.0
@@ -146,17 +146,17 @@ def execution(period: float, duration: float, folder: Path, at: Place) -> Measur
     wave = np.column_stack([-109.0 * away, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
     stroke = planning.Stroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
     clock = Metered()
-    bench = at.connect(clock, session.scene(stroke, presses=False))
+    bench = at.connect(clock, execution.scene(stroke, presses=False))
     servo = watched(bench.robot)
-    arm = Arm(servo, servo.open(), clock)
+    arm = ReadyArm(servo, servo.open(), clock)
     # From where it stands: the plan needs no approach.
     here = servo.state()
     stroke = replace(stroke, position=stroke.position + here.position - stroke.position[0])
     start = stroke.position[0], here.rotation
     plan = planning.make(stroke, period, 1.0, settings.limits, start, 20.0)
-    watch = session.Watch(100.0, 1.0, 1e3, 1e3)
-    touch = session.touch(bench.sensor, at.tool, plan, settings, arm, None)
-    loop = Loop(plan, settings.limits, watch, arm, touch)
+    watch = StopLimits(100.0, 1.0, 1e3, 1e3)
+    touch = execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
+    loop = ServoLoop(plan, settings.limits, watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))
     outcome = loop.run(Interruption())
@@ -166,7 +166,7 @@ def execution(period: float, duration: float, folder: Path, at: Place) -> Measur
         print(f"  ended early: {outcome.reason}")
     servo.close()
     bench.sensor.close()
-    return loop.pace, clock.computed
+    return loop.timing, clock.computed
 
 
 def _line(name: str, late: Floats, missed: int, more: str = "") -> None:
@@ -191,7 +191,7 @@ def main() -> int:
     passed = True
     with tempfile.TemporaryDirectory() as name:
         for rate in given.rates:
-            for command, ours in (("record", recording), ("execute", execution)):
+            for command, ours in (("record", recording), ("execute", executing)):
                 print(f"{command} at {rate:g} Hz, {2 * BLOCKS} blocks of {given.block:g} s")
                 empty: list[tuple[Floats, int]] = []
                 runs: list[Measured] = []

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dmpcli.drag.tutor import HandParameters
 from dmpcli.errors import InputError
 from dmpcli.records import journal, record, streams
+from dmpcli.simulation.hand import HandParameters
 
 MOST_LOST = 1.0
 """s."""

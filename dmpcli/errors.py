@@ -50,3 +50,21 @@ def about(name: str, kind: type[DmpError] = DmpError) -> Iterator[None]:
         yield
     except kind as error:
         raise type(error)(f"{name}: {error}") from None
+
+
+def beside(value: float, bound: float, form: str) -> str:
+    """Return a number as text that lies on the same side of a bound as the number itself.
+
+    Rounded onto its bound a message would contradict itself: 100 ms late, over 100 ms.
+
+    Parameters
+    ----------
+    value, bound : float
+    form : str
+        A format such as ``.3g`` or ``.2f``; it gets more digits where it needs them.
+    """
+    for digits in range(int(form[1:-1]), 17):
+        text = f"{value:.{digits}{form[-1]}}"
+        if not (value - bound) * (float(text) - bound) <= 0.0 or value == bound:
+            return text
+    return text

@@ -9,9 +9,9 @@ import numpy as np
 from dmpcli.calibration.resting import Watcher, at_rest
 from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.calibration.tour import Interrupted
-from dmpcli.drag import enter
+from dmpcli.control import keyboard
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, counted
-from dmpcli.instruments.interruption import Interruption
 from dmpcli.primitives.identification import FEWEST, condition
 from dmpcli.records.static_poses import StaticPose
 
@@ -40,7 +40,7 @@ class Keyboard:
     def line(self) -> str | None:
         """Return a line that was typed, ``q`` at the terminal's end, or None for nothing yet."""
         if b"\n" not in self._typed:
-            more = enter.typed()
+            more = keyboard.typed()
             if more == b"":
                 return "q"
             self._typed += more or b""

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.control import guards
+from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import Clock, RobotState, Sample, Servo
-from dmpcli.instruments.sensing import Sensing
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.rotations import exp, log
 
@@ -45,8 +46,7 @@ class Watcher:
         """
         self._clock.sleep_until(self._clock.now() + STEP)
         state = self._servo.state()
-        if not (np.isfinite(state.position).all() and np.isfinite(state.rotation).all()):
-            raise InstrumentError("robot: the pose that it sends is not a number; check its driver")
+        guards.check_pose(state)
         heard = [] if self._sensing is None else self._sensing.hear(self._clock.now())
         return state, heard
 

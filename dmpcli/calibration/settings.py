@@ -5,16 +5,15 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from dmpcli.instruments import guards
+from dmpcli.planning.limits import Limits, ordered
 from dmpcli.primitives.identification import CONDITION
 from dmpcli.records.settings import Settings
-from dmpcli.streaming.limits import Limits
 
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Workspace = Annotated[
     tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate],
-    AfterValidator(guards.ordered),
+    AfterValidator(ordered),
 ]
 
 

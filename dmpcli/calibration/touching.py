@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from dmpcli.calibration.by_hand import MOVES, Keyboard, enters
 from dmpcli.calibration.resting import Watcher, at_rest
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError, counted
-from dmpcli.instruments.interruption import Interruption
 from dmpcli.instruments.protocols import Clock
 from dmpcli.records.points import PointFile
 from dmpcli.records.static_poses import StaticPose

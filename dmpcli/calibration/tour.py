@@ -10,19 +10,20 @@ from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
 from dmpcli.calibration.settings import CalibrateSettings
-from dmpcli.errors import RefusedError
-from dmpcli.instruments import guards
-from dmpcli.instruments.interruption import Interruption
+from dmpcli.control import guards
+from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.force_tracking import ForceInput
+from dmpcli.control.servo_loop import ServoLoop
+from dmpcli.control.signals import Interruption
+from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
-from dmpcli.instruments.sensing import Sensing
+from dmpcli.planning import plan as planning
+from dmpcli.planning import preflight
+from dmpcli.planning.plan import Plan, Stroke
 from dmpcli.primitives.identification import check_orientations
 from dmpcli.primitives.reach import Reach
 from dmpcli.records.static_poses import StaticPose
-from dmpcli.streaming import plan as planning
-from dmpcli.streaming import preflight
-from dmpcli.streaming.contact import Touch
-from dmpcli.streaming.loop import Arm, Loop, Watch
-from dmpcli.streaming.plan import Plan, Stroke
 
 _TRIES = 3
 
@@ -47,7 +48,7 @@ class Tour:
 
     Parameters
     ----------
-    arm : Arm
+    arm : ReadyArm
         Ready, not in servo mode.
     sensing : Sensing
         Has heard its first sample.
@@ -64,7 +65,7 @@ class Tour:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ReadyArm,
         sensing: Sensing,
         settings: CalibrateSettings,
         interruption: Interruption,
@@ -118,9 +119,10 @@ class Tour:
             checks, joints = preflight.by_joints(plan, there, self._reach, joints)
             for check in checks:
                 if not check.passed:
+                    value = beside(check.value, check.limit, ".3g")
                     raise RefusedError(
                         f"the arm cannot turn the tool through all poses from here: "
-                        f"{check.quantity} {check.value:.3g} {check.unit} is over "
+                        f"{check.quantity} {value} {check.unit} is over "
                         f"{check.limit:.3g} {check.unit}; begin in another pose, or give a "
                         "smaller --tilt"
                     )
@@ -143,18 +145,18 @@ class Tour:
     def _go(self, goal: Pose, where: str) -> None:
         self._stop_if_asked()
         s, state = self._settings, self._arm.servo.state()
-        watch = Watch(
+        watch = StopLimits(
             following_error=s.following_error,
             following_angle=s.following_angle,
             force=s.max_force,
             torque=s.max_torque,
         )
-        loop = Loop(
+        loop = ServoLoop(
             self._way((state.position, state.rotation), goal),
             s.limits,
             watch,
             self._arm,
-            Touch(self._sensing, self._change),
+            ForceInput(self._sensing, self._change),
         )
         outcome = loop.run(self._interruption)
         if outcome.failure is not None:

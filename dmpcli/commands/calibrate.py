@@ -21,9 +21,9 @@ from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
     from dmpcli.calibration.settings import CalibrateSettings
-    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.control.signals import Interruption
+    from dmpcli.control.workcell import Workcell
     from dmpcli.instruments.protocols import Clock, SensorInfo
-    from dmpcli.instruments.urls import Bench
     from dmpcli.primitives.identification import Identification
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.static_poses import StaticPose
@@ -155,24 +155,24 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     from dmpcli.calibration import result
     from dmpcli.calibration.by_hand import Keyboard
     from dmpcli.calibration.tour import Interrupted
-    from dmpcli.instruments import guards, urls
+    from dmpcli.control import guards, workcell
+    from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.interruption import Interruption
-    from dmpcli.instruments.mock import PEN
     from dmpcli.messages import tell, warn
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
+    from dmpcli.simulation.mock import PEN
 
-    addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
-    urls.need_tool(addresses[1], request.tool is not None)
-    repeatable = urls.repeatable(addresses)
+    addresses = workcell.check(request.robot, request.sensor, request.allow_mixed)
+    workcell.need_tool(addresses[1], request.tool is not None)
+    repeatable = workcell.repeatable(addresses)
     _check_existing(request, repeatable)
     keyboard = Keyboard("--by-hand") if request.by_hand else None
     source = None if request.tool is None else streams.read(request.tool)
     geometry = PEN if source is None else tool_file.geometry(source)
     realtime = request.realtime or request.by_hand or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
-    bench = urls.connect(
+    bench = workcell.connect(
         request.robot, request.sensor, clock, allow_mixed=request.allow_mixed, tool=geometry
     )
     if keyboard is None:
@@ -181,8 +181,8 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
         tell(bench.note)
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
-    options = {"robot": urls.in_provenance(request.robot), "by_hand": request.by_hand}
-    options |= {"sensor": urls.in_provenance(request.sensor), "realtime": realtime}
+    options = {"robot": workcell.in_provenance(request.robot), "by_hand": request.by_hand}
+    options |= {"sensor": workcell.in_provenance(request.sensor), "realtime": realtime}
     try:
         with Interruption() as interruption:
             info = bench.sensor.open()
@@ -208,7 +208,7 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
 
 
 def _take(
-    bench: "Bench",
+    bench: "Workcell",
     info: "SensorInfo",
     clock: "Clock",
     settings: "CalibrateSettings",
@@ -219,20 +219,20 @@ def _take(
     """Fill `taken`, by the arm's own motion or as a person leads it."""
     from dmpcli.calibration.resting import Watcher
     from dmpcli.calibration.tour import Tour
-    from dmpcli.instruments.sensing import Sensing
-    from dmpcli.instruments.watchdog import watched
+    from dmpcli.control import execution
+    from dmpcli.control.cycle import ReadyArm
+    from dmpcli.control.force_sensing import Sensing
+    from dmpcli.control.watchdog import watched
     from dmpcli.messages import progress, tell
-    from dmpcli.streaming import session
-    from dmpcli.streaming.loop import Arm
 
     rate = min(settings.sensor_rate, info.rate)
-    robot = watched(bench.robot) if bench.lab is None else bench.robot
-    arm = Arm(robot, robot.open(), clock)
+    robot = bench.robot if bench.lock_step else watched(bench.robot)
+    arm = ReadyArm(robot, robot.open(), clock)
     bench.sensor.start(rate)
     sensing = Sensing(bench.sensor, info, rate, settings.period, clock)
     sensing.first(settings.settle)
     if keyboard is None:
-        reach = session.reach_of(bench.robot, None, None)
+        reach = execution.reach_of(bench.robot, None, None)
         with progress("poses", settings.poses) as step:
             tour = Tour(arm, sensing, settings, interruption, taken, reach, lambda: step(1))
             tour.run()

@@ -24,16 +24,17 @@ from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
-    from dmpcli.instruments.urls import Bench
+    from dmpcli.control.cycle import LoopOutcome, ReadyArm
+    from dmpcli.control.execution_plan import CheckedPlan
+    from dmpcli.control.servo_loop import PlanLoop
+    from dmpcli.control.stroke_file import StrokeSelection
+    from dmpcli.control.workcell import Workcell
     from dmpcli.primitives.coupling import Filter
     from dmpcli.primitives.reach import Reach
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.record import Provenance
     from dmpcli.records.streams import Source
-    from dmpcli.streaming.loop import Arm, Loop, Outcome
-    from dmpcli.streaming.many import Judged
     from dmpcli.streaming.settings import ExecuteSettings
-    from dmpcli.streaming.stroke_file import Batch
     from dmpcli.workflows.keeping import Keeper
 
 
@@ -182,24 +183,30 @@ class Request:
 
 
 def _execute(settings: "ExecuteSettings", request: Request) -> None:
-    from dmpcli.instruments import guards, urls
+    from dmpcli.control import (
+        execution,
+        execution_plan,
+        guards,
+        preflight_table,
+        stroke_file,
+        workcell,
+    )
+    from dmpcli.control.cycle import ReadyArm
+    from dmpcli.control.watchdog import watched
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.watchdog import watched
     from dmpcli.messages import tell, warn
     from dmpcli.records import streams
-    from dmpcli.streaming import many, session, stroke_file, verdict
-    from dmpcli.streaming.loop import Arm
     from dmpcli.workflows.keeping import Keeper
 
-    addresses = urls.check(request.robot, request.sensor, request.allow_mixed)
+    addresses = workcell.check(request.robot, request.sensor, request.allow_mixed)
     if request.sensor is not None:
-        urls.need_tool(addresses[1], request.tool is not None)
-    repeatable = urls.repeatable(addresses)
+        workcell.need_tool(addresses[1], request.tool is not None)
+    repeatable = workcell.repeatable(addresses)
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
     batch = stroke_file.find(request.trajectory, request.ids)
     _warn_of(batch, streams.shown(request.trajectory))
-    coupling = session.coupling_of(batch, settings) if request.presses else None
+    coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
     keeper = None
@@ -208,10 +215,10 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
-    scene = session.scene(first.stroke, request.presses, above)
+    scene = execution.scene(first.stroke, request.presses, above)
     # What weighs on the sensor counts only where there is one.
     held = _decoded(tool_file, weighed=request.sensor is not None)
-    bench = urls.connect(
+    bench = workcell.connect(
         request.robot,
         request.sensor,
         clock,
@@ -223,64 +230,66 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         tell(bench.note)
     robot = watched(bench.robot) if realtime else bench.robot
     try:
-        arm = Arm(robot, robot.open(), clock)
+        arm = ReadyArm(robot, robot.open(), clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
-        if coupling is not None and (late := session.slowed(arm.info.lookahead)):
+        if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
             warn(late)
-        reach = session.reach_of(bench.robot, request.robot_model, held)
+        reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(verdict.table(judged))
-        many.refuse_any(judged)
+            tell(preflight_table.table(judged))
+        execution_plan.refuse_any(judged)
         if keeper is None:
             return
         loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
-        provenance.facts.update(session.facts_of(arm, coupling, settings))
+        provenance.facts.update(execution.facts_of(arm, coupling, settings))
         outcome = _stream(loop, provenance, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
     if realtime:
-        tell(str(loop.pace))
+        tell(str(loop.timing))
     if loop.pressing is not None:
-        tell(session.pressed(loop.pressing))
+        tell(execution.pressed(loop.pressing))
     stopped = closing or outcome.failure or outcome.signal
     if stopped and keeper.kept:
         name = streams.shown(keeper.output, output=True)
         tell(f"{name}: {len(loop.log)} rows kept")
     if closing is not None and outcome.failure is None:
         raise closing
-    left = many.rest_of(batch, loop.drawn) if many.lifts(batch, settings) else ""
+    left = (
+        execution_plan.rest_of(batch, loop.drawn) if execution_plan.lifts(batch, settings) else ""
+    )
     _end(outcome, request, left)
 
 
-def _warn_of(batch: "Batch", name: str) -> None:
+def _warn_of(batch: "StrokeSelection", name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
+    from dmpcli.control import execution_plan
     from dmpcli.messages import warn
     from dmpcli.records import marks
-    from dmpcli.streaming import many
 
     if batch.failed:
-        warn(many.passed_over(batch.failed))
+        warn(execution_plan.passed_over(batch.failed))
     mark = marks.of_facts(batch.found[0].facts)
     if mark is not None:
         warn(marks.text(name, mark))
 
 
 def _judged(
-    batch: "Batch",
+    batch: "StrokeSelection",
     settings: "ExecuteSettings",
-    arm: "Arm",
+    arm: "ReadyArm",
     reach: "Reach | None",
     request: Request,
-) -> "list[Judged]":
+) -> "list[CheckedPlan]":
     """Plan and check every stroke from where the arm stands."""
+    from dmpcli.control import execution_plan
     from dmpcli.messages import progress
-    from dmpcli.streaming import many
 
     with progress("checking", len(batch.found)) as advance:
-        return many.prepare(batch, settings, arm, request.presses, advance, reach)
+        return execution_plan.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
 def _check_output(request: Request, repeatable: bool) -> None:
@@ -310,33 +319,33 @@ def _decoded(tool_file: "Source | None", weighed: bool = True) -> "Tool | None":
 
 
 def _loop(
-    bench: "Bench",
-    arm: "Arm",
-    judged: "list[Judged]",
+    bench: "Workcell",
+    arm: "ReadyArm",
+    judged: "list[CheckedPlan]",
     settings: "ExecuteSettings",
     request: Request,
     coupling: "Filter | None",
     tool_file: "Source | None",
     keeper: "Keeper",
-) -> "Loop":
+) -> "PlanLoop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
+    from dmpcli.control import execution
+    from dmpcli.control.playback import Playback
+    from dmpcli.control.servo_loop import ServoLoop
     from dmpcli.instruments.protocols import PlanPlayer
-    from dmpcli.streaming import session
-    from dmpcli.streaming.loop import Loop
-    from dmpcli.streaming.playback import Playback
 
     touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
-        touch = session.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
-    watch = session.watch(settings)
-    kind = Playback if isinstance(arm.servo, PlanPlayer) else Loop
+        touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+    watch = execution.watch(settings)
+    kind = Playback if isinstance(arm.servo, PlanPlayer) else ServoLoop
     return kind(plans[0], settings.limits, watch, arm, touch, keeper.hindrance, plans[1:])
 
 
-def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
+def _tool(bench: "Workcell", tool_file: "Source | None") -> "Tool":
     tool = _decoded(tool_file)
     if tool is not None:
         return tool
@@ -348,44 +357,45 @@ def _tool(bench: "Bench", tool_file: "Source | None") -> "Tool":
 def _provenance(
     settings: "ExecuteSettings",
     request: Request,
-    batch: "Batch",
+    batch: "StrokeSelection",
     tool_file: "Source | None",
     simulated: bool,
 ) -> "Provenance":
     """Return what is known of the run before it is made."""
-    from dmpcli.instruments import urls
+    from dmpcli.control import execution_plan, workcell
     from dmpcli.records.record import Provenance, input_of
-    from dmpcli.streaming import many
 
     inputs = list(batch.entries)
-    changes = request.sensor is not None or not request.robot.startswith(urls.MOCK)
+    changes = request.sensor is not None or not request.robot.startswith(workcell.MOCK)
     if tool_file is not None and changes:
         inputs.append(input_of("tool", tool_file))
     options = settings.model_dump(mode="json")
     options |= {
-        "robot": urls.in_provenance(request.robot),
-        "sensor": urls.in_provenance(request.sensor),
+        "robot": workcell.in_provenance(request.robot),
+        "sensor": workcell.in_provenance(request.sensor),
     }
     options |= {"coupling": "force" if request.presses else None}
     facts: dict[str, Any] = {"simulated": simulated}
-    if many.lifts(batch, settings):
+    if execution_plan.lifts(batch, settings):
         options["id"] = list(request.ids) or None
-        facts |= many.facts_of(batch)
+        facts |= execution_plan.facts_of(batch)
     else:
         options["id"] = batch.found[0].stroke.id
         facts["trajectory"] = batch.found[0].facts
     return Provenance("execute", options, tuple(inputs), facts)
 
 
-def _stream(loop: "Loop", provenance: "Provenance", realtime: bool, keeper: "Keeper") -> "Outcome":
+def _stream(
+    loop: "PlanLoop", provenance: "Provenance", realtime: bool, keeper: "Keeper"
+) -> "LoopOutcome":
     """Run the loop and write what it logged, whatever ended it."""
-    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.control import execution
+    from dmpcli.control.cycle import LoopOutcome
+    from dmpcli.control.signals import Interruption
     from dmpcli.messages import tell
     from dmpcli.records.schemas import RUN
-    from dmpcli.streaming import session
-    from dmpcli.streaming.loop import Outcome
 
-    outcome = Outcome("a defect of dmpcli")
+    outcome = LoopOutcome("a defect of dmpcli")
     with Interruption() as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
@@ -394,13 +404,15 @@ def _stream(loop: "Loop", provenance: "Provenance", realtime: bool, keeper: "Kee
             outcome = loop.run(interruption)
         finally:
             if len(loop.log):
-                keeper.keep(session.record_of(loop, outcome, provenance, realtime), outcome.failure)
+                keeper.keep(
+                    execution.record_of(loop, outcome, provenance, realtime), outcome.failure
+                )
             else:
                 keeper.drop()
     return outcome
 
 
-def _end(outcome: "Outcome", request: Request, left: str) -> None:
+def _end(outcome: "LoopOutcome", request: Request, left: str) -> None:
     """Say how the run ended, with the exit code that it earns, and which strokes are left."""
     from dmpcli.messages import tell, warn
 

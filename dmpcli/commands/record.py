@@ -25,11 +25,12 @@ from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell, wanted, warn
 
 if TYPE_CHECKING:
-    from dmpcli.drag.loop import Ending, Recorder
-    from dmpcli.drag.references import Reference
+    from dmpcli.control.cycle import LoopOutcome
+    from dmpcli.control.drag_loop import Recorder
     from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.record import Provenance, Record
     from dmpcli.records.streams import Source
+    from dmpcli.simulation.reference_strokes import Reference
 
 _TUTOR = ("reference", "start", "goal", "wave_height", "periods", "seed")
 """Settings of the mock's hand, which mean nothing where a person draws."""
@@ -76,18 +77,19 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     on_terminal(quiet)
-    from dmpcli.drag import enter, references, rehearsal
-    from dmpcli.drag.loop import DEFECT, Ending, Recorder
+    from dmpcli.control import keyboard, workcell
+    from dmpcli.control.cycle import LoopOutcome
+    from dmpcli.control.drag_loop import DEFECT, Recorder
+    from dmpcli.control.signals import Interruption
+    from dmpcli.control.watchdog import watched
     from dmpcli.drag.settings import RecordSettings, check
-    from dmpcli.instruments import urls
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.interruption import Interruption
-    from dmpcli.instruments.mock import PEN
-    from dmpcli.instruments.watchdog import watched
     from dmpcli.records import settings as layers
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
     from dmpcli.records.schemas import DEMONSTRATION
+    from dmpcli.simulation import reference_strokes, rehearsal
+    from dmpcli.simulation.mock import PEN
     from dmpcli.workflows.keeping import Keeper
 
     given = {
@@ -108,21 +110,21 @@ def command(
     }
     settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
-    addresses = urls.check(robot, sensor, allow_mixed)
-    repeatable = urls.repeatable(addresses)
-    _check_tutored(given, repeatable)
-    urls.need_tool(addresses[1], tool is not None)
+    addresses = workcell.check(robot, sensor, allow_mixed)
+    repeatable = workcell.repeatable(addresses)
+    _check_tutored(given, all(address.simulated for address in addresses))
+    workcell.need_tool(addresses[1], tool is not None)
     realtime = realtime or not repeatable
     if settings.drag == "admittance" and settings.coasting > 1.0:
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light")
     check_output(output, repeatable, force)
     tool_source = streams.read(tool) if tool else None
     held = tool_file.decode(tool_source) if tool_source else None
-    stroke = references.build(settings)
+    stroke = reference_strokes.build(settings)
     keeper = Keeper(output, realtime)
     keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
-    bench = urls.connect(
+    bench = workcell.connect(
         robot,
         sensor,
         clock,
@@ -133,10 +135,12 @@ def command(
     if bench.note:
         tell(bench.note)
     rehearsed = rehearsal.rehearse(bench.lab, stroke, settings)
-    ending = Ending(DEFECT)
+    if not realtime and rehearsed.longest == float("inf"):
+        raise InputError("--duration: say how long, for in simulated time nobody presses Enter")
+    ending = LoopOutcome(DEFECT)
     options = {
-        "robot": urls.in_provenance(robot),
-        "sensor": urls.in_provenance(sensor),
+        "robot": workcell.in_provenance(robot),
+        "sensor": workcell.in_provenance(sensor),
         "realtime": realtime,
     }
     # Beside a real instrument a person draws, and nobody knows what.
@@ -152,7 +156,7 @@ def command(
             settings,
             rehearsed.longest,
             signals,
-            lambda: realtime and enter.pressed(),
+            lambda: realtime and keyboard.pressed(),
             rehearsed.begin,
             rehearsed.lead_in,
             keeper.hindrance,
@@ -170,7 +174,7 @@ def command(
     # What was refused before the first row is one line.
     if len(recorder.log) or ending.failure is None:
         if realtime:
-            tell(str(recorder.pace))
+            tell(str(recorder.timing))
         tell(_summary(output, recorder, ending))
     if ending.failure is not None:
         raise ending.failure
@@ -244,7 +248,7 @@ def _provenance(
 
 
 def _recording(
-    recorder: "Recorder", known: "Provenance", ending: "Ending", realtime: bool
+    recorder: "Recorder", known: "Provenance", ending: "LoopOutcome", realtime: bool
 ) -> "Record":
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     from dataclasses import replace
@@ -252,13 +256,13 @@ def _recording(
     from dmpcli.records.record import Record
     from dmpcli.records.schemas import DEMONSTRATION
 
-    facts = known.facts | {"ended": ending.reason} | (recorder.pace.facts() if realtime else {})
+    facts = known.facts | {"ended": ending.reason} | (recorder.timing.facts() if realtime else {})
     if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 
 
-def _summary(output: str, recorder: "Recorder", ending: "Ending") -> str:
+def _summary(output: str, recorder: "Recorder", ending: "LoopOutcome") -> str:
     endings = {
         "duration": "its time was over",
         "rest": "the tool came to rest",

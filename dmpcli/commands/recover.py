@@ -42,17 +42,18 @@ def _record(found: "Found") -> "Record":
     """Return the proper file's record; a run that came to its end gives the very same file."""
     from dataclasses import replace
 
-    from dmpcli.drag import log
+    from dmpcli.control import demonstration_log, run_log
     from dmpcli.records.record import Record
     from dmpcli.records.schemas import DEMONSTRATION
-    from dmpcli.streaming import run_file
 
     drags = found.schema is DEMONSTRATION
-    columns = log.columns(found.rows) if drags else run_file.columns(found.rows)
+    columns = demonstration_log.columns(found.rows) if drags else run_log.columns(found.rows)
     facts = found.provenance.facts
     if not found.whole:
         options = found.provenance.options
-        facts = facts | (log.recovered() if drags else run_file.recovered(columns, options))
+        facts = facts | (
+            demonstration_log.recovered() if drags else run_log.recovered(columns, options)
+        )
         seconds = float(columns["t"][-1])
         facts = facts | {"recovered": {"rows": len(found.rows), "seconds": seconds}}
     return Record(found.schema, columns, replace(found.provenance, facts=facts))

@@ -20,10 +20,10 @@ from dmpcli.messages import on_terminal, tell, warn
 
 if TYPE_CHECKING:
     from dmpcli.drag.settings import RecordSettings
-    from dmpcli.instruments.virtual.faults import Faults
-    from dmpcli.instruments.virtual.hand import VisitingHand
-    from dmpcli.instruments.virtual.lab import Setting
     from dmpcli.primitives.wrench import Tool
+    from dmpcli.simulation.elite_server.faults import LabFaults
+    from dmpcli.simulation.elite_server.lab import Setting
+    from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
 
 
 CLEARANCE = 0.1
@@ -100,14 +100,14 @@ def command(
     on_terminal(quiet)
     import time
 
-    from dmpcli.drag.loop import LONGEST_LOOKAHEAD
+    from dmpcli.control.drag_loop import LONGEST_LOOKAHEAD
+    from dmpcli.control.signals import Interruption
     from dmpcli.drag.settings import RecordSettings, check
-    from dmpcli.instruments.interruption import Interruption
-    from dmpcli.instruments.virtual import faults as fault_words
-    from dmpcli.instruments.virtual.lab import VirtualLab
-    from dmpcli.instruments.virtual.serving import Ports, Serving
     from dmpcli.records import streams
     from dmpcli.records.settings import resolve
+    from dmpcli.simulation.elite_server import faults as fault_words
+    from dmpcli.simulation.elite_server.lab import VirtualLab
+    from dmpcli.simulation.elite_server.lab_server import LabServer, Ports
 
     given = {
         "duration": duration,
@@ -135,7 +135,7 @@ def command(
         raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
     ports = Ports(sensor_port, http_port, tcp_port, robot_port, monitor_port)
     with Interruption() as signals:
-        with Serving(VirtualLab(setting, hand), faults, host, ports, settings.seed) as serving:
+        with LabServer(VirtualLab(setting, hand), faults, host, ports, settings.seed) as serving:
             line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
             print(line, flush=True)  # noqa: T201
             tell("serving; Ctrl-C ends it")
@@ -148,16 +148,20 @@ def command(
 
 
 def _scene(
-    settings: "RecordSettings", faults: "Faults", tool: Path | None, strokes: int, lookahead: float
+    settings: "RecordSettings",
+    faults: "LabFaults",
+    tool: Path | None,
+    strokes: int,
+    lookahead: float,
 ) -> "tuple[Setting, VisitingHand]":
     """Lay the plate under the stroke, park the pen over it, and call the hand that draws it."""
-    from dmpcli.drag import references, rehearsal
-    from dmpcli.instruments.mock import PEN
-    from dmpcli.instruments.virtual.hand import VisitingHand
-    from dmpcli.instruments.virtual.joint_arm import LAG
-    from dmpcli.instruments.virtual.lab import Setting
+    from dmpcli.simulation import reference_strokes, rehearsal
+    from dmpcli.simulation.elite_server.joint_arm import LAG
+    from dmpcli.simulation.elite_server.lab import Setting
+    from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
+    from dmpcli.simulation.mock import PEN
 
-    stroke = references.build(settings)
+    stroke = reference_strokes.build(settings)
     scene = rehearsal.scene(stroke, settings)
     # A set-point waits for its turn, then in the buffer, and the servos lag behind it.
     delay = 1.0 / settings.control_rate + lookahead + LAG
@@ -194,7 +198,7 @@ def _on(path: Path, pose: str | None, unit: str | None, setting: "Setting") -> "
     """Put a surface in the place of the plate."""
     from dataclasses import replace
 
-    from dmpcli.instruments.virtual.part import facing
+    from dmpcli.simulation.elite_server.workpiece import facing
     from dmpcli.workflows import surface_input
 
     shape = surface_input.read(path, pose, unit).surface

@@ -12,7 +12,7 @@ from dmpcli.messages import on_terminal
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
     from dmpcli.calibration.by_hand import Keyboard
-    from dmpcli.instruments.interruption import Interruption
+    from dmpcli.control.signals import Interruption
     from dmpcli.instruments.protocols import Clock, Servo
     from dmpcli.records.points import PointFile
 
@@ -48,15 +48,15 @@ def command(
     """Lead the tip to a point by pendant or hand; Enter takes it, at rest, and q ends."""
     on_terminal(quiet)
     from dmpcli.calibration.by_hand import Keyboard
-    from dmpcli.instruments import guards, urls
+    from dmpcli.control import guards, workcell
+    from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.instruments.interruption import Interruption
     from dmpcli.messages import tell
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
 
     _check(pairs, angles, part, every, count)
-    repeatable = urls.repeatable(urls.check(robot, None))
+    repeatable = workcell.repeatable(workcell.check(robot, None))
     streams.check_writable(output)
     if output != "-" and not (repeatable or force) and Path(output).exists():
         raise InputError(
@@ -68,7 +68,7 @@ def command(
     realtime = realtime or keyboard is not None or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
     geometry = None if tool is None else tool_file.geometry(streams.read(tool))
-    bench = urls.connect(robot, None, clock, tool=geometry)
+    bench = workcell.connect(robot, None, clock, tool=geometry)
     if bench.note:
         tell(bench.note)
     try:

@@ -1,1 +1,1 @@
-"""The control loop of ``record``: compensation, admittance drag and the mock tutor."""
+"""Settings of `record`."""

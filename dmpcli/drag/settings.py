@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
-from dmpcli.instruments import guards
+from dmpcli.planning.limits import ordered
 from dmpcli.primitives.admittance import Bounds, Law, check_stable
 from dmpcli.records.settings import Settings
 
@@ -19,7 +19,7 @@ Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 Workspace = Annotated[
     tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate],
-    AfterValidator(guards.ordered),
+    AfterValidator(ordered),
 ]
 _LIGHTEST = 1e-9
 

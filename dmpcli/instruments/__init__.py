@@ -1,1 +1,1 @@
-"""Sensors and robots behind two small protocols, one module per make; the mock lab."""
+"""Sensors and robots behind two small protocols, one module per make."""

@@ -1,12 +1,10 @@
 """An instrument's URL, taken apart: scheme, host, port and the options after the question mark."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, urlsplit
 
 from dmpcli.errors import InputError
-from dmpcli.instruments import registry
-from dmpcli.instruments.mock import options as mock
 
 MOCK = "mock:"
 
@@ -47,8 +45,8 @@ class Address:
         return f"--{self.role} {self.scheme}:{place}{'' if self.port is None else f':{self.port}'}"
 
 
-def parse(url: str, role: str) -> Address:
-    """Take a URL apart.
+def split(url: str, role: str) -> Address:
+    """Take a URL apart, whether or not a driver is installed for its scheme.
 
     Parameters
     ----------
@@ -60,24 +58,15 @@ def parse(url: str, role: str) -> Address:
     Raises
     ------
     InputError
-        No driver is registered for the scheme in this role, host or port is missing or wrong, or
-        an option of the mock is unknown or is not a number in its range.
+        Host or port is missing or wrong, or an option is given twice.
     """
-    scheme, colon, rest = url.partition(":")
-    # Looking up the drivers would slow down the start of every rehearsal, which needs none.
-    if not colon or (scheme != "mock" and scheme not in registry.schemes(role)):
-        choices = ", ".join([MOCK, *(f"{s}://HOST" for s in registry.schemes(role))])
-        raise InputError(f"--{role} {url}: no such instrument; a {role} is one of {choices}")
-    if scheme != "mock":
-        return _real(url, role, scheme)
-    if rest and not rest.startswith("?"):
-        raise InputError(f"--{role} {url}: the mock has no host; options follow as mock:?key=value")
-    address = Address(role, scheme, options=_query(url, role, rest.removeprefix("?")))
-    mock.numbers(address.options, f"--{role} {url}")
-    return address
-
-
-def _real(url: str, role: str, scheme: str) -> Address:
+    scheme, _, rest = url.partition(":")
+    if scheme == "mock":
+        if rest and not rest.startswith("?"):
+            raise InputError(
+                f"--{role} {url}: the mock has no host; options follow as mock:?key=value"
+            )
+        return Address(role, scheme, options=_query(url, role, rest.removeprefix("?")))
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
@@ -117,19 +106,6 @@ def in_provenance(url: str | None) -> str | None:
     if url is None or url.startswith(MOCK):
         return url
     return url.partition(":")[0]
-
-
-def repeatable(addresses: Iterable[Address]) -> bool:
-    """Tell whether a run can be made again: all of its instruments are simulated.
-
-    One real instrument makes it a measurement, which is paced by the real clock and whose file is
-    not replaced unasked.
-
-    Parameters
-    ----------
-    addresses : iterable of Address
-    """
-    return all(address.simulated for address in addresses)
 
 
 def need_tool(sensor: Address, given: bool) -> None:

@@ -1,7 +1,7 @@
 """A robot that is driven by its joints: TCP ↔ joint angles, and whether its controller agrees.
 
 The controller's frames may be turned about z against those of the kinematic model (base_turn,
-flange_turn of `Declaration`); the tool file's flange is the controller's.
+flange_turn of `DriverInfo`); the tool file's flange is the controller's.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import RefusedError
 from dmpcli.instruments import pose_forms
-from dmpcli.instruments.drivers import Declaration, Orientation
+from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.instruments.pose_forms import Pose
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm
@@ -40,12 +40,12 @@ class JointSpace:
     Parameters
     ----------
     arm : Arm
-    declared : Declaration
+    declared : DriverInfo
     tool : Tool, optional
         Without one the TCP is the flange.
     """
 
-    def __init__(self, arm: Arm, declared: Declaration, tool: Tool | None) -> None:
+    def __init__(self, arm: Arm, declared: DriverInfo, tool: Tool | None) -> None:
         self._arm, self._declared = arm, declared
         self._reach = np.zeros(3) if tool is None else tool.tcp_position
         self._attitude = np.eye(3) if tool is None else tool.tcp_rotation

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.instruments.drivers import Declaration, Orientation
+from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
 
 METRE = 1000.0
@@ -14,12 +14,12 @@ Pose = tuple[Floats, Floats]
 """Position, shape (3,), in mm, and rotation, shape (3, 3)."""
 
 
-def decode(declared: Declaration, values: Floats) -> Pose:
+def decode(declared: DriverInfo, values: Floats) -> Pose:
     """Turn a pose as a controller writes it into mm and a matrix.
 
     Parameters
     ----------
-    declared : Declaration
+    declared : DriverInfo
     values : array, shape (6,) or (7,)
         Position first, then the orientation in the declared form.
 
@@ -41,12 +41,12 @@ def decode(declared: Declaration, values: Floats) -> Pose:
     return position, from_euler(-angles).T  # Rz Ry Rx is the inverse of Rx(-rx) Ry(-ry) Rz(-rz)
 
 
-def encode(declared: Declaration, position: Floats, rotation: Floats) -> Floats:
+def encode(declared: DriverInfo, position: Floats, rotation: Floats) -> Floats:
     """Turn mm and a matrix into a pose as a controller reads it; undoes `decode`.
 
     Parameters
     ----------
-    declared : Declaration
+    declared : DriverInfo
     position : array, shape (3,)
         mm.
     rotation : array, shape (3, 3)
@@ -67,11 +67,11 @@ def encode(declared: Declaration, position: Floats, rotation: Floats) -> Floats:
     return np.concatenate([length, np.degrees(angles) if declared.angle == "deg" else angles])
 
 
-def width(declared: Declaration) -> int:
+def width(declared: DriverInfo) -> int:
     """Return how many numbers a pose has."""
     return 7 if declared.orientation == "quaternion" else 6
 
 
-def otherwise(declared: Declaration, orientation: Orientation) -> Declaration:
+def otherwise(declared: DriverInfo, orientation: Orientation) -> DriverInfo:
     """Return the declaration with another orientation form."""
     return replace(declared, orientation=orientation)

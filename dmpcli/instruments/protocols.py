@@ -146,7 +146,20 @@ class RobotState:
     detail: str = ""
 
 
-class Servo(Protocol):
+class Controlled(Protocol):
+    """What a controller and the servo that is made of it have in common."""
+
+    def start(self, period: float) -> None:
+        """Enter servo mode with one set-point every `period` s."""
+
+    def stop(self) -> None:
+        """Leave servo mode and stand still at once; may be called twice."""
+
+    def close(self) -> None:
+        """Disconnect; stops first if still moving; may be called twice."""
+
+
+class Servo(Controlled, Protocol):
     """A robot arm that takes TCP set-points in time."""
 
     def open(self) -> ServoInfo:
@@ -155,17 +168,8 @@ class Servo(Protocol):
     def state(self) -> RobotState:
         """Return the actual pose and mode now."""
 
-    def start(self, period: float) -> None:
-        """Enter servo mode with one set-point every `period` s."""
-
     def send(self, position: Floats, rotation: Floats) -> bool:
         """Send one set-point; False when the controller did not take it."""
-
-    def stop(self) -> None:
-        """Leave servo mode and stand still at once; may be called twice."""
-
-    def close(self) -> None:
-        """Disconnect; stops first if still moving."""
 
 
 @runtime_checkable

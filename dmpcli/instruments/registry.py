@@ -2,22 +2,23 @@
 
 The name of an entry point is the URL's scheme, its value a factory ``make(address, clock)`` that
 returns a `Sensor` or a `ServoDriver`. Those of this package are registered in the same way as those
-of any other.
+of any other. A factory whose attribute ``lock_step`` is true makes instruments that have no time of
+their own: their world goes on as far as the clock that they are given, real or simulated.
 """
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dmpcli.errors import InputError
-from dmpcli.instruments.drivers import ServoDriver
+from dmpcli.instruments.address import Address
 from dmpcli.instruments.protocols import Clock, Sensor
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
 
-    from dmpcli.instruments.address import Address
+    from dmpcli.instruments.driver_protocol import ServoDriver
 
-SensorFactory: TypeAlias = "Callable[[Address, Clock], Sensor]"
+SensorFactory = Callable[[Address, Clock], Sensor]
 RobotFactory: TypeAlias = "Callable[[Address, Clock], ServoDriver]"
 
 GROUPS = {"sensor": "dmpcli.sensors", "robot": "dmpcli.robots"}
@@ -57,6 +58,17 @@ def robot_factory(scheme: str) -> RobotFactory:
     """
     factory: RobotFactory = _load("robot", scheme)
     return factory
+
+
+def lock_step(address: Address) -> bool:
+    """Tell whether an instrument keeps to whatever clock it is given: its factory says so.
+
+    Raises
+    ------
+    InputError
+        Its driver cannot be had.
+    """
+    return bool(getattr(_load(address.role, address.scheme), "lock_step", False))
 
 
 def _installed(role: str) -> "EntryPoints":

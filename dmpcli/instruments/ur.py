@@ -23,7 +23,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import sockets
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
 from dmpcli.instruments.options import Options
 from dmpcli.instruments.protocols import Clock, RobotMode
 
@@ -122,7 +122,7 @@ class UrDriver:
         self._servoing = False
         self._stamp: tuple[float, float] | None = None  # the controller's and when it was new
 
-    def connect(self) -> Declaration:
+    def connect(self) -> DriverInfo:
         """Connect for reading; nothing starts on the robot.
 
         Raises
@@ -138,10 +138,9 @@ class UrDriver:
             "connecting", lambda: interface(self._host, variables=list(VARIABLES))
         )
         # Longer than a period at which the robot's own watchdog would stop it is never sent.
-        return Declaration(
+        return DriverInfo(
             make="Universal Robots",
             space="pose",
-            pacing="client",
             period_range=(0.002, 0.5 / self._watchdog),
             lookahead=self._lookahead,
             length="m",
@@ -238,10 +237,6 @@ class UrDriver:
                 ),
             )
         )
-
-    def buffer_level(self) -> int | None:
-        """The robot holds no set-points that it would tell of."""
-        return None
 
     def stop(self) -> None:
         """Decelerate and end servo mode; the script on the robot stays until `close`."""

@@ -1,1 +1,1 @@
-"""The loop of ``execute``: pre-flight checks, set-points on absolute deadlines, stops."""
+"""Settings of `execute`."""

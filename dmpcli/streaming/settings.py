@@ -6,18 +6,17 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from dmpcli.errors import InputError
-from dmpcli.instruments import guards
+from dmpcli.planning.limits import Limits, ordered
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law
 from dmpcli.records.settings import Settings
-from dmpcli.streaming.limits import Limits
 
 # No product of two of them overflows.
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Workspace = Annotated[
     tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate],
-    AfterValidator(guards.ordered),
+    AfterValidator(ordered),
 ]
 
 COUPLED = 0.1

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from dmpcli.control.force_sensing import Sensing
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.instruments.mock import PEN_DOWN
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
-from dmpcli.instruments.sensing import Sensing
+from dmpcli.simulation.mock import PEN_DOWN
 
 INFO = SensorInfo("fake", 100.0, np.full(6, 100.0))
 

@@ -3,8 +3,8 @@ import pytest
 
 from dmpcli.calibration import touching
 from dmpcli.calibration.resting import Watcher
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError
-from dmpcli.instruments.interruption import Interruption
 from dmpcli.records import pairs, touched
 from dmpcli.records.points import PairFile, PointFile
 from dmpcli.records.streams import read

@@ -7,17 +7,17 @@ from dmpcli.calibration import result
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.calibration.tour import Interrupted, Tour
+from dmpcli.control.cycle import ReadyArm
+from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.mock import PEN, Lab, MockSensor, MockServo, Scene
-from dmpcli.instruments.mock.parameters import Faults, Servo
-from dmpcli.instruments.sensing import Sensing
 from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
 from dmpcli.primitives.compensation import Compensation
 from dmpcli.primitives.reach import Reach
-from dmpcli.streaming.loop import Arm
+from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Scene
+from dmpcli.simulation.mock.parameters import Faults, ServoParameters
 
 
 class Bench:
@@ -38,7 +38,7 @@ class Bench:
         self.taken, self.interruption, self.ticks = [], Interruption(), 0
         self.home = lab.arm.rotation.copy()
         self.tour = Tour(
-            Arm(servo, servo.open(), clock),
+            ReadyArm(servo, servo.open(), clock),
             sensing,
             self.settings,
             self.interruption,
@@ -168,7 +168,7 @@ def test_an_arm_that_cannot_is_refused_before_anything_moves():
 
 
 def test_an_arm_that_never_settles_is_named():
-    scene = replace(Scene(), servo=replace(Servo(), lag=0.03))
+    scene = replace(Scene(), servo=replace(ServoParameters(), lag=0.03))
     bench = Bench(scene, poses=4, patience=0.4)
     plain, rng = bench.tour._watcher._servo.state, np.random.default_rng(0)
 

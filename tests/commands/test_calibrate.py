@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.instruments.mock import PEN
 from dmpcli.records import record, schemas, static_poses
 from dmpcli.records import tool as tool_file
 from dmpcli.records.streams import Source, read
+from dmpcli.simulation.mock import PEN
 from tests.commands.terminal import DMPCLI, Terminal
 
 

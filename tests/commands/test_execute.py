@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from dmpcli.cli import app
 from dmpcli.commands.execute import Request, _check_output
 from dmpcli.errors import InputError
-from dmpcli.instruments.mock import PEN
 from dmpcli.records import record, schemas, streams, tool
 from dmpcli.records.record import Provenance, Record
+from dmpcli.simulation.mock import PEN
 
 START = np.array([-551.030, 131.399, -17.560])
 FACTS = {"k": [100.0] * 6, "d": [20.0] * 6, "tau": 5.0, "alpha_e": [5.0] * 6}
@@ -384,7 +384,7 @@ def test_a_run_that_goes_on_is_not_disturbed_by_another_of_its_name(traj, tmp_pa
     def never(*_, **__):
         raise AssertionError("the instruments were reached")
 
-    monkeypatch.setattr("dmpcli.instruments.urls.connect", never)
+    monkeypatch.setattr("dmpcli.control.workcell.connect", never)
     (tmp_path / "run.parquet.journal").touch()
     result = execute(traj, "-o", tmp_path / "run.parquet", "--realtime", expect=2)
     assert "dmpcli recover" in result.stderr

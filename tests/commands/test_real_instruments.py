@@ -7,10 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.instruments.mock import PEN
-from dmpcli.instruments.virtual.lab import Setting, VirtualLab
-from dmpcli.instruments.virtual.service import ControllerService
 from dmpcli.records import record, schemas, streams, tool
+from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.simulation.elite_server.service import ControllerService
+from dmpcli.simulation.mock import PEN
 from tests.commands.test_execute import START, columns, written
 from tests.instruments.elite.conftest import flange_at
 from tests.instruments.elite.scripted import HOME, Scripted

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.commands import record
-from dmpcli.drag import enter
+from dmpcli.control import keyboard, workcell
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
-from dmpcli.instruments import clock, urls
-from dmpcli.instruments.mock import PEN, MockServo
+from dmpcli.instruments import clock
 from dmpcli.records import journal, streams, tool
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, decode
 from dmpcli.records.rows import Rows
 from dmpcli.records.schemas import DEMONSTRATION
 from dmpcli.records.streams import Source, read
-from tests.drag.drag_fakes import drag_settings
+from dmpcli.simulation.mock import PEN, MockServo
+from tests.control.drag_fakes import drag_settings
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(record.command)
@@ -159,7 +159,7 @@ def test_a_bad_preset_is_refused_by_name_before_anything_moves(tmp_path, monkeyp
     def never(*_):
         raise AssertionError("the instruments were reached")
 
-    monkeypatch.setattr("dmpcli.instruments.urls.connect", never)
+    monkeypatch.setattr("dmpcli.control.workcell.connect", never)
     preset, out = tmp_path / "mine.toml", tmp_path / "demo.parquet"
     lines = {
         "mass": "[0.005, 0.005, 0.01, 0.1, 0.1, 0.1]",
@@ -211,7 +211,7 @@ def test_enter_ends_the_recording_in_real_time_only(tmp_path, monkeypatch):
     lead_in = 50  # cycles, in which the mock tutor sets the pen down
     presses = iter([False] * (lead_in + 9) + [True])
     monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
-    monkeypatch.setattr(enter, "pressed", lambda: next(presses))
+    monkeypatch.setattr(keyboard, "pressed", lambda: next(presses))
     assert run("-o", out, "--realtime").exit_code == 0
     assert len(demonstration(out)) == 10
     run("-o", out, "--duration", 2)
@@ -219,7 +219,7 @@ def test_enter_ends_the_recording_in_real_time_only(tmp_path, monkeypatch):
 
 
 def test_nobody_presses_enter_where_no_person_sits():
-    assert enter.pressed() is False
+    assert keyboard.pressed() is False
 
 
 def test_a_real_recording_is_replaced_by_force_only(tmp_path):
@@ -235,15 +235,15 @@ def test_a_real_recording_is_replaced_by_force_only(tmp_path):
 @pytest.fixture
 def half_real(monkeypatch):
     """A mock lab that passes for a mock robot with a real sensor."""
-    connect = urls.connect
-    addresses = urls.parse("mock:", "robot"), urls.parse("netft://10.0.0.7", "sensor")
-    monkeypatch.setattr(urls, "check", lambda *_: addresses)
+    connect = workcell.connect
+    addresses = workcell.parse("mock:", "robot"), workcell.parse("netft://10.0.0.7", "sensor")
+    monkeypatch.setattr(workcell, "check", lambda *_: addresses)
 
     def pretend(robot, sensor, clock, **options):
         monkeypatch.undo()
         return connect("mock:", "mock:", clock, **options)
 
-    monkeypatch.setattr(urls, "connect", pretend)
+    monkeypatch.setattr(workcell, "connect", pretend)
     monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
     return ("--sensor", "netft://10.0.0.7", "--allow-mixed", "--duration", 2)
 
@@ -280,7 +280,7 @@ def test_a_recording_that_goes_on_is_not_disturbed_by_another_of_its_name(
     def never(*_, **__):
         raise AssertionError("the instruments were reached")
 
-    monkeypatch.setattr(urls, "connect", never)
+    monkeypatch.setattr(workcell, "connect", never)
     pen, out = tmp_path / "pen.json", tmp_path / "demo.parquet"
     pen.write_bytes(tool.encode(PEN))
     going = Journal(

@@ -5,14 +5,14 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.drag import log
+from dmpcli.control import demonstration_log
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.records import journal, record, schemas, streams
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.rows import Rows
 from dmpcli.workflows.keeping import Keeper
-from tests.drag.drag_fakes import rehearse
+from tests.control.drag_fakes import rehearse
 
 KNOWN = Provenance("record", {"seed": 1}, (), {"simulated": True})
 
@@ -85,7 +85,9 @@ def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_p
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 70), {})
     facts = KNOWN.facts | {"ended": "duration", "missed": 1}
-    whole = Record(schemas.DEMONSTRATION, log.columns(rows), replace(KNOWN, facts=facts))
+    whole = Record(
+        schemas.DEMONSTRATION, demonstration_log.columns(rows), replace(KNOWN, facts=facts)
+    )
 
     def full(path, content):
         raise InputError(f"{path}: cannot be written: No space left on device")
@@ -107,7 +109,7 @@ def test_another_failure_is_told_after_the_one_of_the_file(drawn, tmp_path, monk
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 5), {})
     (tmp_path / "a").mkdir()
-    whole = Record(schemas.DEMONSTRATION, log.columns(rows), KNOWN)
+    whole = Record(schemas.DEMONSTRATION, demonstration_log.columns(rows), KNOWN)
     keeper.keep(whole, InstrumentError("the sensor is silent"))
     assert "dmpcli recover" in capsys.readouterr().err
     keeper.drop()

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmpcli.instruments.address import parse
+from dmpcli.control.workcell import parse
 from tests.commands.virtual_lab import FREE_PORTS, Lab, run
-from tests.instruments.virtual.virtual_fakes import Client
+from tests.simulation.elite_server.virtual_fakes import Client
 
 START = (-551.030, 131.399, -17.560)
 
@@ -94,8 +94,8 @@ def test_the_sensors_records_come_by_udp_and_its_pages_by_http():
 
 @pytest.mark.slow
 def test_a_tool_of_ones_own_hangs_on_the_sensor(tmp_path):
-    from dmpcli.instruments.mock import PEN
     from dmpcli.records import tool as tool_file
+    from dmpcli.simulation.mock import PEN
 
     heavy = replace(PEN, weight=20.0, zero=None)
     (tmp_path / "tool.json").write_bytes(tool_file.encode(heavy))

@@ -9,9 +9,9 @@ import numpy as np
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.netft import make
-from dmpcli.instruments.virtual.rdt_box import RdtBox
-from dmpcli.instruments.virtual.rdt_faults import BoxFaults
-from dmpcli.instruments.virtual.rdt_settings import BoxSettings
+from dmpcli.simulation.netft_server.box import RdtBox
+from dmpcli.simulation.netft_server.faults import BoxFaults
+from dmpcli.simulation.netft_server.settings import BoxSettings
 
 WRENCH = np.array([1.5, -2.25, 30.125, 0.1, -0.2, 0.3])
 

@@ -1,5 +1,6 @@
 """The example of docs/drivers.md, run as it stands there."""
 
+import importlib
 import re
 import socketserver
 import sys
@@ -12,13 +13,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from dmpcli.control import workcell
 from dmpcli.errors import InputError, InstrumentError, RefusedError
-from dmpcli.instruments import registry, ur, urls
+from dmpcli.instruments import driver_protocol, registry, ur
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.elite import settings as elite
 from dmpcli.instruments.netft import options as netft
 
+# A driver of version 0.1 imports from where things were.
+pytestmark = pytest.mark.filterwarnings("ignore:dmpcli.instruments.drivers:DeprecationWarning")
+
 PAGE = (Path(__file__).parents[2] / "docs" / "drivers.md").read_text()
+
+
+def example(scheme):
+    """The page's driver of that scheme."""
+    codes = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    return next(code for code in codes if code.startswith(f'"""``{scheme}://'))
 
 
 class Acme(socketserver.ThreadingTCPServer):
@@ -48,10 +59,13 @@ class Acme(socketserver.ThreadingTCPServer):
         return " ".join(map(repr, self.pose)) if request == "pose" else said.get(request, "ok")
 
 
-@pytest.fixture
-def acme(tmp_path, monkeypatch):
-    code = re.search(r"```python\n(.*?)```", PAGE, re.S)[1]
-    (tmp_path / "dmpcli_acme.py").write_text(code)
+# What the page of version 0.1 had as its example.
+OLD = Path(__file__).with_name("acme_of_0_1.txt").read_text()
+
+
+@pytest.fixture(params=[example("acme"), OLD], ids=["this version", "version 0.1"])
+def acme(request, tmp_path, monkeypatch):
+    (tmp_path / "dmpcli_acme.py").write_text(request.param)
     monkeypatch.syspath_prepend(tmp_path)
     points = re.findall(r'entry-points\."([^"]+)"\]\n(\w+) = "([^"]+)"', PAGE)
     installed = EntryPoints(EntryPoint(name, value, group) for group, name, value in points)
@@ -68,7 +82,7 @@ def acme(tmp_path, monkeypatch):
 
 
 def test_the_example_drives_its_robot_and_reads_its_sensor(acme):
-    bench = urls.connect(f"{acme.url}?lookahead=0.2", acme.url, MonotonicClock())
+    bench = workcell.connect(f"{acme.url}?lookahead=0.2", acme.url, MonotonicClock())
     robot, sensor = bench.robot, bench.sensor
     info = robot.open()
     assert (info.make, info.lookahead) == ("Acme A1", 0.2)
@@ -99,17 +113,26 @@ def test_the_example_drives_its_robot_and_reads_its_sensor(acme):
 
 def test_the_example_says_what_is_wrong_as_the_page_asks(acme):
     with pytest.raises(InputError, match="speed: there is no such option; acme has lookahead"):
-        urls.connect(f"{acme.url}?speed=1", None, MonotonicClock())
+        workcell.connect(f"{acme.url}?speed=1", None, MonotonicClock())
     acme.mode = "teach"
-    robot = urls.connect(acme.url, None, MonotonicClock()).robot
+    robot = workcell.connect(acme.url, None, MonotonicClock()).robot
     with pytest.raises(RefusedError, match="not in remote mode"):
         robot.open()
     robot.close()
     acme.mode, acme.pose = "remote", [np.nan] * 6
-    robot = urls.connect(acme.url, None, MonotonicClock()).robot
+    robot = workcell.connect(acme.url, None, MonotonicClock()).robot
     with pytest.raises(InstrumentError, match="pose: answers 'nan"):
         robot.open()
     robot.close()
+
+
+def test_the_old_place_of_the_protocol_says_where_it_is_now(monkeypatch):
+    monkeypatch.delitem(sys.modules, "dmpcli.instruments.drivers", raising=False)
+    with pytest.warns(DeprecationWarning, match=r"is dmpcli\.instruments\.driver_protocol now"):
+        old = importlib.import_module("dmpcli.instruments.drivers")
+    assert old.Declaration is driver_protocol.DriverInfo
+    assert old.DriverState is driver_protocol.DriverState
+    assert old.ServoDriver is driver_protocol.ServoDriver
 
 
 def test_the_page_names_every_option_and_no_other():
@@ -120,7 +143,7 @@ def test_the_page_names_every_option_and_no_other():
 
     def known(read, role, scheme):
         with pytest.raises(InputError) as error:
-            read(urls.Address(role, scheme, "h", options={"nothing": "1"}))
+            read(workcell.Address(role, scheme, "h", options={"nothing": "1"}))
         return set(str(error.value).split(f"{scheme} has ")[1].split(", "))
 
     assert told("elite") == known(elite.read, "robot", "elite")

@@ -16,7 +16,7 @@ from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments import registry, ur
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-from dmpcli.instruments.conversion import PoseServo
+from dmpcli.instruments.servo_adapter import PoseServo
 from dmpcli.rotations import exp
 from tests.extras_here import needs
 from tests.instruments import rtde_server
@@ -172,7 +172,7 @@ def test_without_ur_rtde_the_extra_is_named(fakes, monkeypatch, module):
 
 def test_it_declares_poses_in_metres_with_rotation_vectors(fakes):
     declared = driver(lookahead="0.15", watchdog="25").connect()
-    assert (declared.space, declared.pacing) == ("pose", "client")
+    assert declared.space == "pose"
     assert (declared.length, declared.angle) == ("m", "rad")
     assert declared.orientation == "rotation vector"
     assert declared.lookahead == 0.15

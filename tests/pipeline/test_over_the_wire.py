@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmpcli.instruments.mock import PEN
 from dmpcli.records import record, schemas, streams
 from dmpcli.records import tool as tool_file
 from dmpcli.records.record import Provenance, Record
+from dmpcli.simulation.mock import PEN
 from tests.commands.virtual_lab import DMPCLI, Lab
 
 pytestmark = pytest.mark.slow

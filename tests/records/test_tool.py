@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
-from dmpcli.instruments.mock import PEN
 from dmpcli.primitives.identification import Identification, Payload
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import tool
 from dmpcli.records.streams import Source
 from dmpcli.rotations import exp
+from dmpcli.simulation.mock import PEN
 
 TEXT = tool.encode(PEN)
 

@@ -1,10 +1,10 @@
 """Elite EC series: JSON-RPC on port 8055, monitor on 8056, ``elite://HOST``."""
 
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.drivers import ServoDriver
-from dmpcli.instruments.elite.driver import StreamDriver
-from dmpcli.instruments.elite.file_motion import FileDriver
+from dmpcli.instruments.driver_protocol import ServoDriver
+from dmpcli.instruments.elite.file_driver import FileDriver
 from dmpcli.instruments.elite.settings import read
+from dmpcli.instruments.elite.stream_driver import StreamDriver
 from dmpcli.instruments.protocols import Clock
 
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, RefusedError
-from dmpcli.instruments.drivers import Declaration, DriverState
+from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
 from dmpcli.instruments.elite.frames import Report
 from dmpcli.instruments.elite.jsonrpc import Client
 from dmpcli.instruments.elite.monitor import Monitor
 from dmpcli.instruments.elite.requests import Params, Requests
-from dmpcli.instruments.elite.settings import RPC_PORT, Settings
+from dmpcli.instruments.elite.settings import RPC_PORT, EliteSettings
 from dmpcli.instruments.protocols import Clock, RobotMode
 
 MAKE, MODEL = "Elite EC66", "ec66"
@@ -47,7 +47,7 @@ class Controller:
 
     Parameters
     ----------
-    settings : Settings
+    settings : EliteSettings
     clock : Clock
 
     Attributes
@@ -57,7 +57,7 @@ class Controller:
     requests : Requests
     """
 
-    def __init__(self, settings: Settings, clock: Clock) -> None:
+    def __init__(self, settings: EliteSettings, clock: Clock) -> None:
         s = self._settings = settings
         self._clock = clock
         self.name = f"robot {s.host}"
@@ -66,7 +66,7 @@ class Controller:
         self._reported: Floats | None = None
         self.requests = Requests(self._client, self.name)
 
-    def declaration(self, lookahead: float) -> Declaration:
+    def declaration(self, lookahead: float) -> DriverInfo:
         """Return what the controller declares.
 
         Parameters
@@ -75,10 +75,9 @@ class Controller:
             s.
         """
         s = self._settings
-        return Declaration(
+        return DriverInfo(
             make=MAKE,
             space="joint",
-            pacing="client",
             period_range=PERIODS,
             lookahead=lookahead,
             length="mm",

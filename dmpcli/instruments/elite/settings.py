@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from dmpcli.instruments.address import Address
-from dmpcli.instruments.drivers import Orientation
+from dmpcli.instruments.driver_protocol import Orientation
 from dmpcli.instruments.elite.frames import MATCHING_WORD
 from dmpcli.instruments.options import Options
 
@@ -14,7 +14,7 @@ EULER: dict[str, Orientation] = {"xyz": "xyz euler", "zyx": "zyx euler"}
 
 
 @dataclass(frozen=True)
-class Settings:
+class EliteSettings:
     """How an EC controller is spoken to.
 
     Attributes
@@ -38,7 +38,7 @@ class Settings:
     orientation : str
         What the controller's rx, ry, rz are.
     base_turn, flange_turn : float
-        rad; see `Declaration`.
+        rad; see `DriverInfo`.
     tolerance : float
         Of the checks at the start, mm; 0 leaves them out.
     word : int or None
@@ -72,7 +72,7 @@ class Settings:
     oldest: float
 
 
-def read(address: Address) -> Settings:
+def read(address: Address) -> EliteSettings:
     """Read the options of a URL.
 
     Raises
@@ -81,7 +81,7 @@ def read(address: Address) -> Settings:
         One is unknown or out of range.
     """
     options = Options(address)
-    settings = Settings(
+    settings = EliteSettings(
         host=address.host,
         port=RPC_PORT if address.port is None else address.port,
         monitor_port=options.whole("monitor_port", MONITOR_PORT, 1, 65535),

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments.netft import dialects, protocol
-from dmpcli.instruments.netft.box import Box, NoAnswerError, resolve
 from dmpcli.instruments.netft.dialects import Dialect
-from dmpcli.instruments.netft.mailbox import Mailbox
-from dmpcli.instruments.netft.options import ONROBOT_SCALE, Options
+from dmpcli.instruments.netft.http_client import Box, NoAnswerError, resolve
+from dmpcli.instruments.netft.options import ONROBOT_SCALE, NetFtOptions
 from dmpcli.instruments.netft.protocol import RDT_PORT, Command, request
 from dmpcli.instruments.netft.sequence import ahead
 from dmpcli.instruments.netft.settings import BoxInfo
 from dmpcli.instruments.netft.stream import SILENCE, Stream
+from dmpcli.instruments.netft.udp_receiver import UdpReceiver
 from dmpcli.instruments.protocols import Clock, Sample, SensorInfo
 
 ATTEMPTS, PAUSE = 10, 0.1
@@ -51,7 +51,7 @@ class NetFtSensor:
     host : str
     port : int or None
         RDT's; None is 49152.
-    options : Options
+    options : NetFtOptions
     clock : Clock
         The real one.
 
@@ -63,11 +63,11 @@ class NetFtSensor:
         What was lost and dropped; None before `start`.
     """
 
-    def __init__(self, host: str, port: int | None, options: Options, clock: Clock) -> None:
+    def __init__(self, host: str, port: int | None, options: NetFtOptions, clock: Clock) -> None:
         self._host, self._port = host, port or RDT_PORT
         self._options, self._clock = options, clock
         self._opened: _Opened | None = None
-        self._mailbox: Mailbox | None = None
+        self._mailbox: UdpReceiver | None = None
         self.box: BoxInfo | None = None
         self.stream: Stream | None = None
 
@@ -132,7 +132,7 @@ class NetFtSensor:
         if not 0.0 < rate <= opened.info.rate:
             raise self._failed(f"cannot stream at {rate:g} Hz, only up to {opened.info.rate:g}")
         self._end()
-        self._mailbox = mailbox = Mailbox(self._clock)
+        self._mailbox = mailbox = UdpReceiver(self._clock)
         told = self._prepare(opened, mailbox, rate)
         self._ask_for_stream(opened, mailbox, told or rate)
         if told is None:
@@ -190,7 +190,7 @@ class NetFtSensor:
         except ValueError as error:
             raise self._failed(f"does not answer like a force sensor: {error}") from None
 
-    def _prepare(self, opened: _Opened, mailbox: Mailbox, rate: float) -> float | None:
+    def _prepare(self, opened: _Opened, mailbox: UdpReceiver, rate: float) -> float | None:
         """Set what is to be set; return the rate as the box tells it, None where it does not."""
         dialect, number = opened.dialect, self._options.filter
         told: float | None = None
@@ -241,7 +241,7 @@ class NetFtSensor:
             )
         return box.rate
 
-    def _ask_for_stream(self, opened: _Opened, mailbox: Mailbox, rate: float) -> None:
+    def _ask_for_stream(self, opened: _Opened, mailbox: UdpReceiver, rate: float) -> None:
         """Ask until something comes from the box; a request may be lost."""
         command = Command.START_BUFFERED if self._options.buffered else Command.START
         pause = max(PAUSE, 2.0 / rate)
@@ -262,7 +262,7 @@ class NetFtSensor:
             "another client, or a firewall between"
         )
 
-    def _measure(self, opened: _Opened, mailbox: Mailbox, rate: float) -> None:
+    def _measure(self, opened: _Opened, mailbox: UdpReceiver, rate: float) -> None:
         """Make sure of a rate that the box does not tell."""
         self._clock.sleep_until(self._clock.now() + max(_MEASURING, 10.0 / rate))
         letters = [x for x in mailbox.peek() if x.source == opened.address]
@@ -277,7 +277,7 @@ class NetFtSensor:
                 "rate that it has, or set it there"
             )
 
-    def _send(self, opened: _Opened, mailbox: Mailbox, datagram: bytes) -> None:
+    def _send(self, opened: _Opened, mailbox: UdpReceiver, datagram: bytes) -> None:
         try:
             mailbox.send(datagram, opened.address)
         except OSError as error:

@@ -45,7 +45,7 @@ _ONROBOT_FILTERS = 7
 
 
 @dataclass(frozen=True)
-class Options:
+class NetFtOptions:
     """The options of one ``netft://`` URL; the module's table says what they mean.
 
     Attributes
@@ -72,7 +72,7 @@ class Options:
     filter: int | None = None
 
 
-def read(address: Address) -> Options:
+def read(address: Address) -> NetFtOptions:
     """Read the options of a URL.
 
     Parameters
@@ -89,7 +89,7 @@ def read(address: Address) -> Options:
     onrobot = dialect == "onrobot"
     filters = _ONROBOT_FILTERS if onrobot else len(FILTERS)
     low_pass = given.whole("filter", -1, 0, filters - 1)
-    asked = Options(
+    asked = NetFtOptions(
         dialect=dialect,
         http=given.whole("http", HTTP_PORT, 1, 65535),
         tcp=given.whole("tcp", TCP_PORT, 1, 65535),

@@ -25,7 +25,7 @@ CALIBRATION_SIZE = _CALIBRATION.size
 
 _USED = re.compile(
     "prodname|cfgnam|cfgcpf|cfgcpt|scfgfu|scfgtu|cfgmr|cfgcalsel|comrdte|comrdtrate|comrdtbsiz|"
-    "runrate|setrate|setuserfilter|setbias|calcpf|calcpt|calsn"
+    "runrate|setrate|setuserfilter|calcpf|calcpt|calsn"
 )
 """The fields that are read; each may stand in a page once."""
 
@@ -93,8 +93,6 @@ class BoxInfo:
         Records in one datagram of a buffered stream.
     low_pass : int or None
         Number of its low-pass filter, see `FILTERS`.
-    biased : bool
-        Whether a software bias is set.
     serial : str
         Serial number of the calibrated transducer; empty where it does not say.
     """
@@ -108,7 +106,6 @@ class BoxInfo:
     enabled: bool = True
     records: int = 1
     low_pass: int | None = None
-    biased: bool = False
     serial: str = ""
 
 
@@ -164,7 +161,6 @@ def read_pages(api: bytes, calibration: bytes | None = None) -> BoxInfo:
         enabled=fields.get("comrdte", "1").lower() in ("1", "enabled", "on", "true"),
         records=1 if records is None else max(int(records), 1),
         low_pass=None if low_pass is None else int(low_pass),
-        biased=bool(np.any(_list(fields, "setbias"))),
         serial=more.get("calsn", ""),
     )
 

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dmpcli.arrays import Floats
-from dmpcli.instruments import guards
+from dmpcli.arrays import Floats, within
 from dmpcli.instruments.netft import protocol
-from dmpcli.instruments.netft.mailbox import Letter
 from dmpcli.instruments.netft.sequence import Sequence, Verdict
 from dmpcli.instruments.netft.status import Family, describe, serious
+from dmpcli.instruments.netft.udp_receiver import Datagram
 from dmpcli.instruments.protocols import Sample
 
 SILENCE = 0.1
@@ -29,7 +28,7 @@ _AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
 @dataclass
-class Tally:
+class LossCounter:
     """What was not taken as it came, since the start of the stream.
 
     Attributes
@@ -69,7 +68,7 @@ class Stream:
     Attributes
     ----------
     sequence : Sequence
-    tally : Tally
+    tally : LossCounter
     fault : str or None
         What is wrong; final.
     """
@@ -81,7 +80,7 @@ class Stream:
     rate: float
     heard: float
     sequence: Sequence = field(init=False)
-    tally: Tally = field(default_factory=Tally)
+    tally: LossCounter = field(default_factory=LossCounter)
     fault: str | None = None
     _newest: float = -math.inf
     _senseless: int = 0
@@ -91,12 +90,12 @@ class Stream:
         """Begin to count: no stream loses more at once than it sends in a second."""
         self.sequence = Sequence(longest_jump=max(round(self.rate), 64))
 
-    def take(self, letters: Iterable[Letter]) -> list[Sample]:
+    def take(self, letters: Iterable[Datagram]) -> list[Sample]:
         """Take in datagrams.
 
         Parameters
         ----------
-        letters : iterable of Letter
+        letters : iterable of Datagram
             As they arrived.
 
         Returns
@@ -126,7 +125,7 @@ class Stream:
         why = self._dropped or "another client may have taken the stream, or check cable and power"
         self.fault = f"silent for {now - self.heard:.2f} s; {why}"
 
-    def _open(self, letter: Letter) -> protocol.Records | None:
+    def _open(self, letter: Datagram) -> protocol.Records | None:
         if letter.source != self.source:
             host = f"{letter.source[0]}:{letter.source[1]}"
             count = self.tally.foreign[host] = self.tally.foreign.get(host, 0) + 1
@@ -176,7 +175,7 @@ class Stream:
         if serious(status):
             return describe(status, self.family)
         self.tally.warnings += 1 if status else 0
-        if guards.within(wrench, self.limit):
+        if within(wrench, self.limit):
             return ""
         axis = int(np.argmin(np.abs(wrench) < self.limit))
         return (

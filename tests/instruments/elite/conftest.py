@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from dmpcli.instruments import urls
+from dmpcli.control import workcell
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.pose_forms import encode
 from dmpcli.kinematics import chain, models
 from tests.instruments.elite.scripted import HOME, Scripted
-from tests.instruments.test_conversion import declared
+from tests.instruments.test_servo_adapter import declared
 
 
 def flange_at(joints):
@@ -32,7 +32,7 @@ def arm(robot):
         given = {"monitor_port": robot.monitor_port} | options
         more = "&".join(f"{key}={value}" for key, value in given.items())
         url = f"elite://127.0.0.1:{robot.port}?{more}"
-        made.append(urls.connect(url, None, MonotonicClock()).robot)
+        made.append(workcell.connect(url, None, MonotonicClock()).robot)
         return made[-1]
 
     yield servo

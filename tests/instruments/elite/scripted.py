@@ -15,7 +15,7 @@ import numpy as np
 
 from dmpcli.instruments import pose_forms
 from dmpcli.kinematics import inverse, models
-from tests.instruments.test_conversion import declared
+from tests.instruments.test_servo_adapter import declared
 
 LAYOUT = struct.Struct(">IQB8d6d6d8d3i8ii3d5dQQB6d6dBd8dd8d6d6d6d6dB220xI")
 WORD = 0xEC8056EC

@@ -6,18 +6,19 @@ import time
 import numpy as np
 import pytest
 
+from dmpcli.control import guards, workcell
+from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.playback import Playback
+from dmpcli.control.servo_loop import DONE, ServoLoop
+from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
-from dmpcli.instruments import guards, urls
 from dmpcli.instruments.clock import MonotonicClock
-from dmpcli.instruments.interruption import Interruption
-from dmpcli.instruments.mock import PEN
-from dmpcli.instruments.virtual import faults
-from dmpcli.instruments.virtual.lab import Setting, VirtualLab
-from dmpcli.instruments.virtual.service import ControllerService
-from dmpcli.streaming.limits import Limits
-from dmpcli.streaming.loop import DONE, Arm, Loop, Watch
-from dmpcli.streaming.plan import Stroke, make
-from dmpcli.streaming.playback import Playback
+from dmpcli.planning.limits import Limits
+from dmpcli.planning.plan import Stroke, make
+from dmpcli.simulation.elite_server import faults
+from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.simulation.elite_server.service import ControllerService
+from dmpcli.simulation.mock import PEN
 
 START = np.array([-450.0, -120.0, 150.0])
 LIMITS = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
@@ -37,9 +38,9 @@ class Bench:
         more = "&".join(f"{key}={value}" for key, value in given.items())
         url = f"elite://127.0.0.1:{self.service.robot_port}?{more}"
         self.clock = MonotonicClock()
-        self.servo = urls.connect(url, None, self.clock, tool=tool).robot
+        self.servo = workcell.connect(url, None, self.clock, tool=tool).robot
 
-    def loop(self, kind=Loop, duration=1.0, interruption=None):
+    def loop(self, kind=ServoLoop, duration=1.0, interruption=None):
         info = self.servo.open()
         state = self.servo.state()
         assert state.mode == "ready"
@@ -50,8 +51,8 @@ class Bench:
         stroke = Stroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
         here = (state.position, state.rotation)
         plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
-        arm = Arm(self.servo, info, self.clock)
-        return kind(plan, LIMITS, Watch(5.0, 0.1, 50.0, 5.0), arm), way
+        arm = ReadyArm(self.servo, info, self.clock)
+        return kind(plan, LIMITS, StopLimits(5.0, 0.1, 50.0, 5.0), arm), way
 
     def close(self):
         self.servo.close()
@@ -81,7 +82,7 @@ def stands(state):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 @pytest.mark.parametrize("newline", ["yes", "no"])
 def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     made = bench(f"newline={newline}", mode=mode)
@@ -99,7 +100,7 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 @pytest.mark.parametrize(
     ("fault", "words", "error"),
     [
@@ -119,7 +120,7 @@ def test_what_happens_on_the_way_stops_it_with_its_reason(bench, kind, mode, fau
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
     made = bench("drop=robot@0.4", mode=mode)
     loop, way = made.loop(kind)
@@ -130,7 +131,7 @@ def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "mode"), [(Loop, "stream"), (Playback, "file")])
+@pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 def test_a_signal_ends_it_and_the_arm_stands(bench, kind, mode):
     made = bench(mode=mode)
     loop, way = made.loop(kind)

@@ -6,15 +6,15 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import numpy as np
 import pytest
 
+from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock
-from dmpcli.instruments.netft import mailbox, make, stream
+from dmpcli.instruments.netft import make, stream, udp_receiver
 from dmpcli.instruments.netft.driver import ATTEMPTS
 from dmpcli.instruments.netft.protocol import Command, request
 from dmpcli.instruments.netft.settings import Scale
-from dmpcli.instruments.sensing import Sensing
-from dmpcli.instruments.virtual.rdt_faults import BoxFaults
+from dmpcli.simulation.netft_server.faults import BoxFaults
 from tests.instruments import instrument_conformance
 from tests.instruments.rdt_bench import (
     WRENCH,
@@ -209,7 +209,7 @@ def test_malformed_data_is_a_fault():
 
 
 def test_what_was_not_read_in_time_is_told_as_that(box, monkeypatch):
-    monkeypatch.setattr(mailbox, "HELD", 5)
+    monkeypatch.setattr(udp_receiver, "HELD", 5)
     with sensor_at(box) as sensor:
         sensor.open()
         sensor.start(100.0)

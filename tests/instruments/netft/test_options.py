@@ -4,7 +4,7 @@ import pytest
 from dmpcli.errors import InputError
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.netft import NetFtSensor, make, options
-from dmpcli.instruments.netft.options import Options
+from dmpcli.instruments.netft.options import NetFtOptions
 from dmpcli.instruments.netft.settings import Scale
 
 
@@ -13,7 +13,7 @@ def read(**given):
 
 
 def test_without_options_the_box_is_asked_for_everything():
-    assert read() == Options()
+    assert read() == NetFtOptions()
 
 
 def test_every_option_is_read():
@@ -29,7 +29,7 @@ def test_every_option_is_read():
         bias="1",
         filter="12",
     )
-    assert read_options == Options(
+    assert read_options == NetFtOptions(
         dialect="axia",
         http=8080,
         tcp=5000,

@@ -44,7 +44,7 @@ def test_a_page_is_read_as_it_stands():
     assert info.scale == Scale(1e6, 2e6, "N", "N-m")
     np.testing.assert_array_equal(info.limit, [145, 145, 290, 5, 5, 5])
     assert (info.rate, info.internal_rate, info.records) == (1000.0, 7000.0, 40)
-    assert (info.low_pass, info.biased, info.enabled) == (4, False, True)
+    assert (info.low_pass, info.enabled) == (4, True)
 
 
 @pytest.mark.parametrize(
@@ -103,10 +103,6 @@ def test_a_range_that_is_not_told_is_none(ratings):
 @pytest.mark.parametrize("text", ["Disabled", "0"])
 def test_a_box_whose_stream_is_switched_off_says_so(text):
     assert not read_pages(page(comrdte=text)).enabled
-
-
-def test_a_bias_that_is_set_is_seen():
-    assert read_pages(page(setbias="0;0;-12;0;0;0")).biased
 
 
 @pytest.mark.parametrize(

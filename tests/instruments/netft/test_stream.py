@@ -4,8 +4,8 @@ import struct
 import numpy as np
 import pytest
 
-from dmpcli.instruments.netft.mailbox import Letter
 from dmpcli.instruments.netft.stream import MALFORMED, SILENCE, Stream
+from dmpcli.instruments.netft.udp_receiver import Datagram
 
 BOX = ("192.168.1.1", 49152)
 RATE = 100.0
@@ -19,7 +19,7 @@ def record(number, ft=None, status=0, counts=(1, 2, 3, 4, 5, 6)):
 
 
 def letter(content, t=0.0, source=BOX):
-    return Letter(t, source, content)
+    return Datagram(t, source, content)
 
 
 def stream(rate=RATE, heard=0.0, family="net f/t"):
@@ -198,7 +198,7 @@ def jumbled(rng):
                 content = record(first + k, status=1 << dice[k] % 32, counts=values[k])
             elif kind == "late":
                 content = record(first + max(k - 3, 0), counts=values[k])
-            letters.append(Letter(0.01 * k, source, content))
+            letters.append(Datagram(0.01 * k, source, content))
         yield letters
 
 

@@ -1,0 +1,324 @@
+"""What one execution is made of: mock scene, checked plan, sense of touch, run file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.control import guards
+from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
+from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.force_tracking import LONG, ForceInput, ForceTracker
+from dmpcli.control.servo_loop import DONE, PlanLoop
+from dmpcli.control.stroke_file import StrokeSelection
+from dmpcli.errors import InputError
+from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
+from dmpcli.kinematics import models
+from dmpcli.measures.contact import contact
+from dmpcli.planning import plan as planning
+from dmpcli.planning import preflight
+from dmpcli.planning.plan import Plan, Stroke
+from dmpcli.planning.preflight import Check
+from dmpcli.primitives.compensation import Compensation
+from dmpcli.primitives.coupling import Filter, fast_filter
+from dmpcli.primitives.reach import Reach
+from dmpcli.primitives.wrench import Tool
+from dmpcli.records import schemas
+from dmpcli.records.record import Provenance, Record
+from dmpcli.simulation.mock import Plate, Scene
+from dmpcli.streaming.settings import COUPLED, ExecuteSettings
+
+SENSOR_RATE = 100.0
+# A zero is taken over this time, s.
+ZERO_TIME = 0.5
+
+
+def scene(stroke: Stroke, presses: bool, height: float = 0.0) -> Scene:
+    """Return the mock lab where its URL says nothing.
+
+    The arm is parked at the stroke's first pose. There is a plate only for a force coupling, which
+    needs something to press on: through the stroke's start, across its normal there.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    presses : bool
+        Whether the force coupling is on.
+    height : float
+        How far above the plate the stroke begins, mm.
+    """
+    lab = replace(Scene(), position=stroke.position[0])
+    if stroke.rotation is not None:
+        lab = replace(lab, rotation=stroke.rotation[0])
+    if presses and stroke.normal is not None:
+        normal = stroke.normal[0]
+        lab = replace(lab, plate=Plate(stroke.position[0] - height * normal, normal))
+    return lab
+
+
+def prepare(
+    stroke: Stroke, settings: ExecuteSettings, state: RobotState, reach: Reach | None = None
+) -> tuple[Plan, list[Check]]:
+    """Plan the stroke from where the arm stands, and judge it.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    settings : ExecuteSettings
+    state : RobotState
+    reach : Reach, optional
+        The arm whose joints are judged too, from where they are if the state tells it.
+
+    Returns
+    -------
+    Plan
+    list of Check
+        All of them, failed ones too.
+
+    Raises
+    ------
+    RefusedError
+        The arm is not ready.
+    """
+    guards.check_ready(state)
+    start = (state.position, state.rotation)
+    near = standing(stroke, settings, state) if settings.approach is None else []
+    made = planning.make(
+        stroke,
+        settings.period,
+        settings.speed,
+        settings.limits,
+        start,
+        settings.approach or settings.lead_speed,
+    )
+    joints = None if reach is None else reach.standing(state.joints, *start)
+    return made, judge(stroke, made, settings, near, reach, joints)[0]
+
+
+def standing(stroke: Stroke, settings: ExecuteSettings, state: RobotState) -> list[Check]:
+    """Check that the arm stands at a stroke's start."""
+    goal = state.rotation if stroke.rotation is None else stroke.rotation[0]
+    gap = planning.gap((state.position, state.rotation), (stroke.position[0], goal))
+    return preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)
+
+
+def judge(
+    stroke: Stroke,
+    plan: Plan,
+    settings: ExecuteSettings,
+    near: list[Check],
+    reach: Reach | None,
+    joints: Floats | None,
+) -> tuple[list[Check], Floats | None]:
+    """Check one stroke with its ways.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    plan : Plan
+    settings : ExecuteSettings
+    near : list of Check
+        What was found of where the arm stands.
+    reach : Reach or None
+    joints : array, shape (6,), or None
+        Before, rad.
+
+    Returns
+    -------
+    list of Check
+        All of them, failed ones too.
+    array, shape (6,), or None
+        Joint angles after, rad.
+    """
+    s = settings
+    checks = preflight.at_rest(stroke, s.speed, s.period, s.limits) + near
+    checks += preflight.within_limits(plan, stroke, s.limits)
+    if reach is None:
+        return checks, None
+    by_joints, joints = preflight.by_joints(plan, stroke, reach, joints)
+    return checks + by_joints, joints
+
+
+def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None:
+    """Return the arm whose joints can be judged: the one that is named, else the robot's own.
+
+    Parameters
+    ----------
+    robot : Servo
+        Open.
+    model : str, optional
+        Its kinematic model, as asked for.
+    tool : Tool, optional
+
+    Raises
+    ------
+    InputError
+        The model is not known, or is not the robot's.
+    """
+    own: Reach | None = getattr(robot, "reach", None)  # a servo that is driven by poses has none
+    if model is None or own is None:
+        return own if model is None else Reach(models.model(model), tool)
+    if own.arm is not models.model(model):
+        raise InputError(f"--robot-model {model}: the robot is an {own.arm.name}; leave it out")
+    return own
+
+
+def touch(
+    sensor: Sensor,
+    tool: Tool,
+    plan: Plan,
+    settings: ExecuteSettings,
+    arm: ReadyArm,
+    coupling: Filter | None,
+    tool_check: float | None = None,
+) -> ForceInput:
+    """Let the sensor stream at rest, and return what the loop feels with.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    tool : Tool
+        Where its zero is None, it is taken now.
+    plan : Plan
+    settings : ExecuteSettings
+    arm : ReadyArm
+    coupling : Filter, optional
+        None: only log the wrench.
+    tool_check : float, optional
+        By how much the tool's zero may miss the reading at rest, N; None does not check it.
+
+    Raises
+    ------
+    RefusedError
+        The tool's zero and payload do not explain the reading.
+    InstrumentError
+        The sensor cannot be reached, is silent, or sends what must not be believed.
+    """
+    info = sensor.open()
+    rate = min(SENSOR_RATE, info.rate)
+    sensor.start(rate)
+    sensing = Sensing(sensor, info, rate, plan.period, arm.clock)
+    zeroed = sensing.zeroed(tool, plan.rotation[0], ZERO_TIME, tool_check)
+    pressing = None
+    if coupling is not None:
+        lookahead = arm.info.lookahead
+        pressing = ForceTracker(settings.law(lookahead), coupling, plan, lookahead)
+    return ForceInput(sensing, Compensation(zeroed), pressing)
+
+
+def coupling_filter(stroke: Stroke, facts: Mapping[str, Any], settings: ExecuteSettings) -> Filter:
+    """Return the filter of eq. (10) on the normal axis.
+
+    Where the facts state no tau, the stroke's duration stands for it: the time constant that
+    `fast_filter` chooses does not depend on tau, the gains k and d that it logs do.
+
+    Raises
+    ------
+    InputError
+        The trajectory states no normal, no set-point was given, or the model is unstable.
+    """
+    if stroke.normal is None:
+        raise InputError(
+            "--coupling force: the trajectory states no surface normal to press along; "
+            "make it anew with generalize"
+        )
+    settings.law()
+    tau = float(facts.get("tau") or stroke.t[-1] - stroke.t[0])
+    return fast_filter(tau / settings.speed, settings.period)
+
+
+def coupling_of(batch: StrokeSelection, settings: ExecuteSettings) -> Filter:
+    """Return the filter for all strokes of a run: their time constants differ in no case.
+
+    Raises
+    ------
+    InputError
+        As `coupling_filter`, for any of them.
+    """
+    filters = [coupling_filter(found.stroke, found.facts, settings) for found in batch.found]
+    return filters[0]
+
+
+def facts_of(arm: ReadyArm, coupling: Filter | None, settings: ExecuteSettings) -> dict[str, Any]:
+    """Return the arm's look-ahead and the gains that were chosen on the normal axis."""
+    lookahead = arm.info.lookahead
+    if isinstance(arm.servo, PlanPlayer):
+        return {}  # its look-ahead is the most that it may take to begin
+    if coupling is None:
+        return {"lookahead": lookahead}
+    gains = {"k": coupling.k, "d": coupling.d, "tau": coupling.tau, "alpha_e": coupling.alpha_e}
+    model = settings.law(lookahead).model
+    of_model = {"mass": float(model.mass[0]), "damping": float(model.damping[0])}
+    return {"lookahead": lookahead, "coupling": gains | of_model}
+
+
+def slowed(lookahead: float) -> str:
+    """Say that the arm answers too late for a quick force coupling; empty where it does not."""
+    if lookahead <= LONG:
+        return ""
+    return (
+        f"--coupling force: behind a look-ahead of {lookahead:g} s the force is corrected "
+        f"{lookahead / COUPLED:.2g} times as slowly; lookahead={COUPLED:g} in --robot is better"
+    )
+
+
+def pressed(pressing: ForceTracker) -> str:
+    """Say how hard the coupling pressed, and for how much of the stroke it did not."""
+    if not pressing.felt:
+        return "no stroke was drawn under force"
+    how = contact(np.array(pressing.felt), pressing.law.contact)
+    return (
+        f"force along the normal {how.mean:.2f} N in the mean, {how.least:.2f} to "
+        f"{how.largest:.2f} N; no contact on {100.0 * how.absent:.3g} % of the stroke"
+    )
+
+
+def watch(settings: ExecuteSettings) -> StopLimits:
+    """Return when the loop stops by itself."""
+    return StopLimits(
+        settings.following_error, settings.following_angle, settings.max_force, settings.max_torque
+    )
+
+
+def record_of(
+    loop: PlanLoop, outcome: LoopOutcome, provenance: Provenance, realtime: bool
+) -> Record:
+    """Return the run as a record.
+
+    Parameters
+    ----------
+    loop : PlanLoop
+        Has run, at least one cycle.
+    outcome : LoopOutcome
+    provenance : Provenance
+        What was known before.
+    realtime : bool
+        Lateness is a fact only where a clock ran: a simulated run is the same every time.
+    """
+    facts = provenance.facts | {
+        "reason": outcome.reason,
+        "completed": outcome.reason == DONE,
+        "missed": loop.timing.missed,
+    }
+    if realtime:
+        facts |= loop.timing.facts()
+    if loop.pressing is not None and loop.pressing.felt:
+        felt = np.array(loop.pressing.felt)
+        facts["contact"] = asdict(contact(felt, loop.pressing.law.contact))
+    if "strokes" in facts:
+        facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
+    return Record(schemas.RUN, loop.log.columns(), replace(provenance, facts=facts))
+
+
+def progress_of(ids: Sequence[str], drawn: Sequence[str]) -> dict[str, list[str]]:
+    """Return what the file of a run of many strokes says at its end: ``drawn``, ``remaining``.
+
+    Parameters
+    ----------
+    ids, drawn : sequence of str
+        All strokes of the run in order, and those that are whole.
+    """
+    done = set(drawn)
+    return {"drawn": list(drawn), "remaining": [name for name in ids if name not in done]}

@@ -1,0 +1,153 @@
+"""The log of a run, row by row, and the columns of its file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dmpcli import rotations
+from dmpcli.arrays import AnyArray, Floats
+from dmpcli.measures.timing import punctuality
+from dmpcli.records.rows import RECOVERED, Rows
+from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+
+Pose = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One servo cycle.
+
+    Attributes
+    ----------
+    t : float
+        When the actual pose was read, s since the first deadline.
+    t_plan : float
+        Time along the trajectory file, s; after a missed deadline it lags further behind `t`.
+    planned, sent, actual : tuple of array, shape (3,) and (3, 3)
+        mm; a cycle that stopped before it sent repeats the last set-point.
+    deadline, lateness : float
+        When the set-point was due, s since the first, and how much later it was sent, s.
+    wrench : array, shape (6,), or None
+        Compensated, at the TCP, base axes.
+    coupling : float
+        e of eq. (10), mm.
+    state, phase : str
+    id : str or None
+        The stroke that the set-point lies on; None on the way to, from and between strokes.
+    """
+
+    t: float
+    t_plan: float
+    planned: Pose
+    sent: Pose
+    actual: Pose
+    deadline: float
+    lateness: float
+    wrench: Floats | None
+    coupling: float
+    state: str
+    phase: str
+    id: str | None = None
+
+
+_TIMES = ("t", "t_plan", "deadline", "lateness")
+_POSES = (("planned", "plan"), ("sent", "sent"), ("actual", ""))
+
+
+class RunLog:
+    """Rows of a run, kept whatever ends it.
+
+    Parameters
+    ----------
+    oriented : bool
+        Whether the trajectory states an orientation; without one the planned angles are absent.
+    sensed, coupled : bool
+        Whether there is a sensor, and a force coupling.
+
+    Attributes
+    ----------
+    rows : Rows
+        ``clock`` is the loop's clock, which no file keeps.
+    """
+
+    def __init__(self, oriented: bool = True, sensed: bool = False, coupled: bool = False) -> None:
+        groups = dict.fromkeys(("clock", *_TIMES), 1)
+        for name, _ in _POSES:
+            turned = oriented or name != "planned"
+            groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
+        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
+        self.rows = Rows(groups, ("state", "phase", "id"))
+        self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def add(self, clock: float, row: Row) -> None:
+        """Remember one cycle.
+
+        Parameters
+        ----------
+        clock : float
+            The loop's clock, s.
+        row : Row
+        """
+        planned = row.planned if self._oriented else row.planned[:1]
+        felt: tuple[float | Floats, ...] = ()
+        if self._sensed:
+            felt = (np.nan if row.wrench is None else row.wrench,)
+        if self._coupled:
+            felt += (row.coupling,)
+        times = (row.t, row.t_plan, row.deadline, row.lateness)
+        self.rows.add(
+            (clock, *times, *planned, *row.sent, *row.actual, *felt),
+            (row.state, row.phase, row.id or ""),
+        )
+
+    def columns(self) -> dict[str, AnyArray]:
+        """Return the columns of the run file, each of shape (rows,)."""
+        return columns(self.rows)
+
+
+def columns(rows: Rows) -> dict[str, AnyArray]:
+    """Return the columns of a run file, each of shape (rows,).
+
+    Parameters
+    ----------
+    rows : Rows
+        At least one; of a `RunLog`, this one or a journal's.
+    """
+    out: dict[str, AnyArray] = {name: rows.numbers(name) for name in _TIMES}
+    for name, suffix in _POSES:
+        out |= _split(rows.numbers(name), POSITION, suffix)
+        if f"{name}_rotation" in rows.groups:
+            angles = rotations.to_euler_continuous(rows.rotations(f"{name}_rotation"))
+            out |= _split(angles, EULER_ANGLES, suffix)
+    if "wrench" in rows.groups:
+        out |= _split(rows.numbers("wrench"), WRENCH, "")
+    if "coupling" in rows.groups:
+        out["coupling"] = rows.numbers("coupling")
+    out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
+    return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
+
+
+def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the facts of a run of which only a journal is left.
+
+    Parameters
+    ----------
+    known : dict of array
+        Columns of its file.
+    options : mapping
+        Of its provenance; the servo period.
+    """
+    found = punctuality(known["deadline"], known["lateness"], float(options["period"]))
+    late = {"p50": found.median, "p99": found.p99, "max": found.worst}
+    ended = {"reason": RECOVERED, "completed": False}
+    return ended | {"missed": found.missed, "lateness": late}
+
+
+def _split(values: Floats, names: tuple[str, ...], suffix: str) -> dict[str, AnyArray]:
+    keys = suffixed(names, suffix) if suffix else names
+    return {key: values[:, i] for i, key in enumerate(keys)}

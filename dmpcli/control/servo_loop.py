@@ -1,0 +1,229 @@
+"""What has plans drawn, and the servo loop of `execute`: one set-point per period.
+
+The plan never jumps: every step between two set-points is one that the pre-flight checks have seen,
+however late the loop is. Every cycle is logged, the last one too.
+"""
+
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from dmpcli.control.cycle import (
+    ControlLoop,
+    Cycle,
+    LoopOutcome,
+    ReadyArm,
+    StopLimits,
+    StoppedAtOnce,
+)
+from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.plan_cursor import PlanCursor
+from dmpcli.control.run_log import Row, RunLog
+from dmpcli.control.signals import Interruption
+from dmpcli.control.step_limits import StepLimits, check_start
+from dmpcli.errors import DmpError, InputError, RefusedError
+from dmpcli.planning.limits import Limits
+from dmpcli.planning.plan import Plan, Pose
+
+DONE = "done"
+
+
+class PlanLoop(ControlLoop):
+    """Has one plan after the other drawn.
+
+    Parameters
+    ----------
+    plan : Plan
+        Checked.
+    limits : Limits
+    watch : StopLimits
+    arm : ReadyArm
+        Not yet in servo mode.
+    touch : ForceInput, optional
+        A sensor and, where asked, the force coupling.
+    hindrance : callable, optional
+        Read once a cycle; what it returns ends the run.
+    then : sequence of Plan
+        What is drawn after `plan`, each from where the one before it rests.
+
+    Attributes
+    ----------
+    STREAMS : bool
+        Whether the arm waits for our set-points, as in `ControlLoop`.
+    plan : Plan
+        The one that is drawn.
+    drawn : list of str
+        Ids of the strokes that were drawn to their ends.
+    pressing : ForceTracker or None
+        The force coupling, where there is one.
+    log : RunLog
+        One row per cycle; it is there whatever goes wrong.
+
+    Raises
+    ------
+    InputError
+        There is a force coupling, and nobody waits for set-points.
+    """
+
+    STREAMS: ClassVar[bool]
+
+    def __init__(
+        self,
+        plan: Plan,
+        limits: Limits,
+        watch: StopLimits,
+        arm: ReadyArm,
+        touch: ForceInput | None = None,
+        hindrance: Callable[[], DmpError | None] = lambda: None,
+        then: Sequence[Plan] = (),
+    ) -> None:
+        super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
+        self._take(arm, touch)
+        self.plan, self._then = plan, deque(then)
+        self.drawn: list[str] = []
+        self.pressing: ForceTracker | None = touch.pressing if touch else None
+        if self.pressing is not None and not self.STREAMS:
+            raise InputError(
+                "--coupling force: corrects each set-point as it is sent, and this robot plays the "
+                "whole plan by itself; leave mode=file out of --robot"
+            )
+        self._touch, self._limits = touch, limits
+        self._cursor = PlanCursor(plan, limits, wait=self.pressing is not None)
+        self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
+
+    def run(self, interruption: Interruption) -> LoopOutcome:
+        """Go on until the arm rests at the end, or a reason to stop; the arm is stopped after.
+
+        Parameters
+        ----------
+        interruption : Interruption
+            The first signal ends the run, the second at once.
+
+        Returns
+        -------
+        LoopOutcome
+            Anything that an instrument or a limit can cause; only defects are raised. A signal
+            that comes after the last set-point ends no run early, and is not told.
+        """
+        self._interruption = interruption
+        how, failure = self._run()
+        if self._cursor.braking:
+            how = how or "decelerated along the path"
+        return self._outcome(how, failure, DONE)
+
+    @property
+    def virtual(self) -> bool:
+        """Whether what it feels with belongs to a lab that ``dmpcli simulate`` serves."""
+        return self._touch is not None and self._touch.sensing.info.virtual
+
+    def _enter(self) -> None:
+        """Enter servo mode, and make sure that the arm still stands where the plan begins."""
+        self._heed()
+        self._arm.servo.start(self._period)
+        # To start may take seconds.
+        self._heed()
+        check_start(self._arm.servo.state(), self.plan, self._limits)
+
+    def _next(self, cycle: Cycle, owed: bool = False) -> Pose:
+        if owed:
+            self._advance()
+        if self._interruption.count > 1:
+            raise StoppedAtOnce("stopped at once at the second signal")
+        if self._interruption.count or self._hindrance() is not None:
+            self._brake()
+        return self._setpoint(cycle)
+
+    @abstractmethod
+    def _brake(self) -> None:
+        """Come to rest from now on."""
+
+    @abstractmethod
+    def _setpoint(self, cycle: Cycle) -> Pose:
+        """Return the set-point where the plan is now, checked."""
+
+    def _goes_on(self, cycle: Cycle) -> bool:
+        """Go on until the last plan has ended, or the brake, and the arm stands still."""
+        over = self._cursor.finished and (not self._then or self._cursor.braking)
+        if over and self._rest.reached(cycle.state):
+            self._count()
+            return False
+        self._advance()
+        return True
+
+    def _advance(self) -> None:
+        """Go on by one set-point; after a plan's last one to the first of the next, where it is."""
+        self._count()
+        if not (self._then and self._cursor.finished) or self._cursor.braking:
+            self._cursor.advance()
+            return
+        self.plan = self._then.popleft()
+        if self.pressing is not None:
+            self.pressing = self.pressing.on(self.plan)
+        self._cursor = PlanCursor(self.plan, self._limits, wait=self.pressing is not None)
+
+    def _count(self) -> None:
+        """Count the stroke as drawn once the arm has had the time to reach its end, or rests."""
+        behind = 0.0 if self._cursor.finished else self._arm.info.lookahead / self._period
+        arrived = self._cursor.index >= self.plan.last + behind
+        if arrived and self.plan.id not in self.drawn[-1:]:
+            self.drawn.append(self.plan.id)
+
+    def _record(self, cycle: Cycle, setpoint: Pose | None, lateness: float | None) -> None:
+        index, state = self._cursor.index, cycle.state
+        draws = self.plan.draws_at(index)
+        actual = (state.position, state.rotation)
+        self.log.add(
+            state.t,
+            Row(
+                # A state is as old as its controller's last report.
+                t=cycle.due + cycle.late + (state.t - cycle.woke),
+                t_plan=self.plan.time_at(index),
+                planned=self.plan.at(index),
+                sent=setpoint or self._last or actual,
+                actual=actual,
+                deadline=cycle.due,
+                lateness=cycle.late if lateness is None else lateness,
+                wrench=cycle.wrench,
+                coupling=self.pressing.e if self.pressing and draws else 0.0,
+                state=state.mode,
+                phase=self._cursor.phase,
+                id=self.plan.id if draws else None,
+            ),
+        )
+
+
+class ServoLoop(PlanLoop):
+    """Streams: each set-point is sent in its cycle; to brake is to decelerate along the path."""
+
+    STREAMS = True
+
+    def _enter(self) -> None:
+        super()._enter()
+        self._steps = StepLimits(self._limits, self._period)
+
+    def _brake(self) -> None:
+        """Decelerate along the path from now on, if any of it is left."""
+        if self._then or not self._cursor.finished:
+            self._cursor.brake()
+
+    def _check(self, cycle: Cycle) -> None:
+        super()._check(cycle)
+        if self.pressing is not None and self._cursor.waiting and self.pressing.given_up:
+            raise RefusedError(f"{self.pressing.given_up}; check surface and sensor")
+
+    def _setpoint(self, cycle: Cycle) -> Pose:
+        pressing, cursor = self.pressing, self._cursor
+        if pressing is not None and cursor.waiting and pressing.settled:
+            cursor.release()
+        index = cursor.index
+        position, rotation = self.plan.at(index)
+        if pressing is not None and index > self.plan.last:
+            position = position + pressing.leave(index)
+        elif pressing is not None and index >= self.plan.lead:
+            if cycle.wrench is None or cursor.braking:
+                position = position + pressing.hold(index)
+            else:
+                position = position + pressing.displace(index, cycle.wrench)
+        self._steps.check(self._last, position, rotation)
+        return position, rotation

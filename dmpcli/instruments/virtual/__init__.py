@@ -1,1 +1,0 @@
-"""Simulated instruments that speak the real ones' bytes, served on loopback."""

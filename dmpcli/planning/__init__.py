@@ -1,0 +1,1 @@
+"""From trajectories to checked set-points: arrays alone, no clock and no instrument."""

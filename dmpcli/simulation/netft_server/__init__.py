@@ -1,0 +1,1 @@
+"""A simulated force/torque box that speaks the real one's bytes."""

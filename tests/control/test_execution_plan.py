@@ -1,0 +1,70 @@
+"""Messages and facts of a run of many strokes stay short however many there are."""
+
+import numpy as np
+import pytest
+
+from dmpcli.control import execution_plan
+from dmpcli.control.execution_plan import CheckedPlan
+from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
+from dmpcli.errors import InputError, RefusedError
+from dmpcli.planning.plan import Stroke
+from dmpcli.planning.preflight import Check
+from dmpcli.streaming.settings import ExecuteSettings
+from tests.control.streaming_fakes import plan, stroke
+
+
+def batch(*names, folder=True):
+    t, position = np.arange(3.0), np.zeros((3, 3))
+    found = [
+        FoundStroke(Stroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]}) for name in names
+    ]
+    return StrokeSelection(tuple(found), {}, (), folder)
+
+
+def test_what_is_left_is_named_as_the_options_that_draw_it():
+    said = execution_plan.rest_of(batch("a", "b", "c"), ["b"])
+    assert said == "1 of 3 strokes are drawn; the rest: --id a --id c"
+
+
+def test_of_a_thousand_that_are_left_a_few_are_named():
+    names = [str(i) for i in range(1000)]
+    said = execution_plan.rest_of(batch(*names), names[:3])
+    assert said.startswith("3 of 1000 strokes are drawn; the rest: --id 3 --id 4 ")
+    assert said.endswith("and 989 more, which inspect lists")
+    assert len(said) < 160
+
+
+@pytest.mark.slow
+def test_of_a_thousand_that_fail_a_few_are_named():
+    bad = Check("speed", 9.0, 1.0, "mm/s", 0.5, 7, "slow it down")
+    judged = [CheckedPlan(plan(), [bad]) for _ in range(1000)]
+    with pytest.raises(RefusedError, match=r"^stroke 0: speed 9 .*1000 of 1000 strokes fail") as e:
+        execution_plan.refuse_any(judged)
+    assert str(e.value).endswith("0, 0, 0, 0, 0 and 995 more")
+
+
+def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():
+    plain, lifted = ExecuteSettings(), ExecuteSettings(clearance=5.0)
+    assert not execution_plan.lifts(batch("a", folder=False), plain)
+    assert execution_plan.lifts(batch("a", folder=False), lifted)
+    assert execution_plan.lifts(batch("a", "b", folder=False), plain)
+    assert execution_plan.lifts(batch("a"), plain)
+
+
+def test_the_set_points_wait_for_the_look_ahead():
+    between = execution_plan.ways(ExecuteSettings(), 0.15, presses=False)
+    assert (between.settling, between.clearance, between.spare) == (8, 20.0, 0.0)
+    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 5.0
+    with pytest.raises(InputError, match="--clearance 5: must be over 5 mm"):
+        execution_plan.ways(ExecuteSettings(clearance=5.0), 0.0, presses=True)
+
+
+def test_the_facts_hold_each_strokes_own_ends_once():
+    facts = execution_plan.facts_of(batch("a", "b"))
+    assert facts["trajectory"] == {"tau": 2.0}
+    assert facts["strokes"][1] == {"id": "b", "start": [0, 0, 0]}
+
+
+def test_a_stroke_that_is_asked_to_wait_forever_names_the_option():
+    with pytest.raises(InputError, match="raise --speed"):
+        plan(stroke(), speed=1e-3, period=0.002)

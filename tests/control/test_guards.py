@@ -1,0 +1,108 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmpcli.control import guards
+from dmpcli.control.guards import FollowingErrorMonitor
+from dmpcli.errors import InputError, InstrumentError, RefusedError
+from dmpcli.instruments.protocols import RobotState, ServoInfo
+from dmpcli.rotations import exp
+
+BOX = (-1.0, 1.0, -2.0, 2.0, -3.0, 3.0)
+INFO = ServoInfo("fake", (0.002, 0.1), 0.2)
+PLACE, LEVEL = np.array([0.5, -1.5, 2.5]), np.eye(3)
+NAN = np.array([0.0, np.nan, 0.0])
+
+
+def state(position=PLACE, rotation=LEVEL, mode="ready"):
+    return RobotState(0.0, position, rotation, mode)
+
+
+def test_an_arm_that_is_ready_and_inside_may_go_on():
+    guards.check_state(state(), BOX)
+    guards.check_state(state(1e9 * PLACE), None)
+
+
+@pytest.mark.parametrize(
+    ("bad", "error", "words"),
+    [
+        (state(mode="protective stop"), RefusedError, "protective stop"),
+        (state(NAN), InstrumentError, "not a number"),
+        (state(rotation=np.full((3, 3), np.inf)), InstrumentError, "not a number"),
+        (state(PLACE + [0.6, 0, 0]), RefusedError, r"the tool at x = 1\.100 mm"),
+        (state(PLACE - [0, 0.6, 0]), RefusedError, r"the tool at y = -2\.100 mm"),
+    ],
+)
+def test_another_may_not(bad, error, words):
+    with pytest.raises(error, match=words):
+        guards.check_state(bad, BOX)
+
+
+def test_only_a_pose_inside_is_sent():
+    guards.check_setpoint(PLACE, LEVEL, BOX)
+    for position, rotation in ((NAN, LEVEL), (PLACE, LEVEL * np.nan), (2 * PLACE, LEVEL)):
+        with pytest.raises(RefusedError, match="next set-point"):
+            guards.check_setpoint(position, rotation, BOX)
+
+
+def test_a_period_out_of_the_robots_range_is_the_users_mistake():
+    for period in (0.002, 0.1):
+        guards.check_period(INFO, period, "--period")
+    for period in (0.001, 0.2):
+        with pytest.raises(
+            InputError, match=r"--period: the fake robot .* 0\.002 to 0\.1 s .*500 Hz"
+        ):
+            guards.check_period(INFO, period, "--period")
+
+
+def test_a_period_between_two_of_the_robots_steps_is_the_users_mistake():
+    info = replace(INFO, period_step=0.001)
+    for period in (1.0 / 50.0, 1.0 / 250.0, 0.003, 0.007):
+        guards.check_period(info, period, "--period")
+    for period in (1.0 / 60.0, 0.0205):
+        with pytest.raises(InputError, match="whole multiples of 1 ms"):
+            guards.check_period(info, period, "--period")
+
+
+@pytest.mark.parametrize(("lookahead", "limit"), [(0.2, 0.1), (0.0, 0.02)])
+def test_half_the_look_ahead_or_a_period_is_late(lookahead, limit):
+    info = ServoInfo("fake", (0.002, 0.1), lookahead)
+    guards.check_late(limit, info, 0.02)
+    for late in (limit + 0.001, np.nan):
+        with pytest.raises(RefusedError, match="late"):
+            guards.check_late(late, info, 0.02)
+
+
+def test_the_trail_reaches_back_over_the_look_ahead_and_no_further():
+    trail = FollowingErrorMonitor(INFO, 0.02, 5.0, 0.1)
+    trail.check(state())
+    for i in range(17):
+        trail.add(PLACE + [10.0 * i, 0.0, 0.0], LEVEL)
+    # 0.2 s of look-ahead and 0.1 s more: the last sixteen.
+    trail.check(state(PLACE + [10.0, 4.9, 0.0]))
+    with pytest.raises(RefusedError, match=r"following error 10\.00 mm"):
+        trail.check(state(PLACE))
+    with pytest.raises(RefusedError, match=r"0\.200 rad"):
+        trail.check(state(PLACE + [10.0, 0.0, 0.0], exp(np.array([0.0, 0.2, 0.0]))))
+
+
+def test_everything_is_left_whatever_one_of_them_raises():
+    done = []
+
+    def fail(name, error):
+        done.append(name)
+        raise error(name)
+
+    first = guards.leave(
+        lambda: fail("stop", InstrumentError),
+        lambda: fail("close", InstrumentError),
+        lambda: done.append("sensor"),
+    )
+    assert done == ["stop", "close", "sensor"]
+    assert str(first) == "stop"
+    done.clear()
+    with pytest.raises(ZeroDivisionError):
+        guards.leave(lambda: fail("stop", ZeroDivisionError), lambda: done.append("sensor"))
+    assert done == ["stop", "sensor"]
+    assert guards.leave() is None

@@ -1,0 +1,535 @@
+import dataclasses
+import signal
+
+import numpy as np
+import pytest
+
+from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.servo_loop import DONE, ServoLoop
+from dmpcli.control.signals import Interruption
+from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.instruments.protocols import Sample, SensorInfo
+from dmpcli.primitives import admittance
+from dmpcli.primitives.coupling import Law, fast_filter
+from dmpcli.rotations import exp
+from tests.control.streaming_fakes import (
+    PEN_DOWN,
+    START,
+    WIDE,
+    FakeClock,
+    FakeServo,
+    plan,
+    rows_of,
+    stroke,
+)
+
+WATCH = StopLimits(5.0, 0.1, 50.0, 5.0)
+PERIOD = 0.02
+# Of what the loop itself watches, the test's touch feels nothing.
+NOTHING = np.zeros(6)
+
+
+class FakeSensor:
+    """A sample with every poll, except where `silent`; `wrench` is what it senses."""
+
+    def __init__(self, clock, wrench=NOTHING, rate=100.0):
+        self.clock, self.wrench, self.silent = clock, wrench, False
+
+    def poll(self):
+        if self.silent:
+            return []
+        return [Sample(self.clock.now(), 1, np.array(self.wrench, dtype=float), True, 0)]
+
+
+class Bench:
+    def __init__(self, made=None, jumps=None, at=None, limits=WIDE, presses=False, **servo):
+        self.plan = plan() if made is None else made
+        self.clock = FakeClock(self.plan.period, jumps)
+        self.servo = FakeServo(self.clock, at=at, **servo)
+        self.interruption = Interruption()
+        arm = ReadyArm(self.servo, self.servo.info, self.clock)
+        self.sensor = FakeSensor(self.clock)
+        self.loop = ServoLoop(self.plan, limits, WATCH, arm, self.touch() if presses else None)
+
+    def touch(self):
+        """Feel in base axes, and seek the surface at 5 N / 2 N·s/mm = 2.5 mm/s."""
+        info = SensorInfo("fake", 100.0, np.full(6, 100.0))
+        sensing = Sensing(self.sensor, info, 100.0, PERIOD, self.clock)
+        model = admittance.Law(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
+        law = Law(model, 5.0, 5.0, 0.5, 0.1, 10.0)
+        pressing = ForceTracker(law, fast_filter(5.0, PERIOD), self.plan)
+        return ForceInput(sensing, lambda sensed, _: sensed, pressing)
+
+    def run(self):
+        return self.loop.run(self.interruption)
+
+    @property
+    def rows(self):
+        return rows_of(self.loop.log)
+
+    def column(self, name):
+        return np.array([getattr(row, name) for row in self.rows])
+
+    def stroke_rows(self):
+        return [row for row in self.rows if row.phase == "stroke"]
+
+
+def test_an_undisturbed_run_sends_the_plan():
+    bench = Bench()
+    outcome = bench.run()
+    assert (outcome.reason, outcome.failure, outcome.signal) == (DONE, None, None)
+    assert bench.loop.timing.missed == 0
+    sent = np.array([row.sent[0] for row in bench.stroke_rows()])
+    assert np.array_equal(sent, bench.plan.position)
+    assert np.array_equal(bench.column("deadline"), np.arange(len(bench.rows)) * 0.02)
+    assert np.all(bench.column("lateness") < 1e-9)
+    assert bench.servo.calls == ["start", "stop"]
+
+
+def older(state, age):
+    return dataclasses.replace(state, t=state.t - age)
+
+
+def test_a_row_tells_when_the_pose_was_true_not_when_it_was_read():
+    bench = Bench()
+    state = bench.servo.state
+    ages = iter(np.tile([0.008, 0.004, 0.0], 1000))
+    bench.servo.state = lambda: older(state(), next(ages))
+    bench.run()
+    late = bench.column("deadline") - bench.column("t")
+    assert set(np.round(late, 9)) == {0.0, 0.004, 0.008}
+
+
+def test_it_holds_the_goal_until_the_look_ahead_has_passed():
+    bench = Bench()
+    bench.run()
+    held = [row for row in bench.rows if row.phase == "stop"]
+    assert len(held) * 0.02 >= 0.2
+    assert all(np.array_equal(row.sent[0], bench.plan.position[-1]) for row in held)
+
+
+def test_a_small_delay_is_not_carried_on():
+    bench = Bench(jumps={100: 0.015})
+    bench.run()
+    assert bench.loop.timing.missed == 0
+    late = bench.column("lateness")
+    assert late[100] == pytest.approx(0.015)
+    assert np.delete(late, 100).max() < 1e-9
+    assert len(bench.stroke_rows()) == 501
+
+
+def test_after_a_late_cycle_the_plan_goes_on_from_where_it_is():
+    """65 ms late at deadline 100: deadlines 101-103 are gone, and the stroke ends 60 ms later."""
+    bench = Bench(jumps={100: 0.065})
+    outcome = bench.run()
+    assert (outcome.reason, bench.loop.timing.missed) == (DONE, 3)
+    np.testing.assert_allclose(
+        bench.column("deadline")[98:103], [1.96, 1.98, 2.0, 2.08, 2.1], atol=1e-9
+    )
+    assert bench.rows[100].lateness == pytest.approx(0.065)
+    assert np.array_equal([row.sent[0] for row in bench.stroke_rows()], bench.plan.position)
+    assert np.all(np.diff(bench.column("t")) > 0)
+    assert bench.stroke_rows()[-1].deadline == pytest.approx(10.0 + 0.06)
+
+
+def test_lateness_breaks_no_limit_that_was_checked_before():
+    """At 128 mm/s four set-points at once would be 512 mm/s; the limit is 250."""
+    bench = Bench(plan(stroke(duration=1.6)), jumps={30: 0.07, 40: 0.045, 50: 0.09})
+    bench.run()
+    assert bench.loop.timing.missed == 3 + 2 + 4
+    sent = np.array([row.sent[0] for row in bench.rows])
+    step = np.diff(sent, axis=0)
+    assert np.linalg.norm(step, axis=1).max() / PERIOD <= WIDE.speed
+    assert np.linalg.norm(np.diff(step, axis=0), axis=1).max() / PERIOD**2 <= WIDE.acceleration
+
+
+def test_a_late_first_cycle_begins_at_the_first_set_point():
+    bench = Bench(jumps={0: 0.045})
+    bench.run()
+    assert bench.loop.timing.missed == 2
+    assert np.array_equal(bench.rows[0].sent[0], bench.plan.position[0])
+    assert bench.rows[1].deadline == pytest.approx(0.06)
+
+
+def test_no_two_set_points_leave_in_one_period_after_a_delay():
+    bench = Bench(jumps={100: 0.065})
+    bench.run()
+    at = bench.column("deadline") + bench.column("lateness")
+    assert np.diff(at).min() > 0.0149
+
+
+def test_later_than_half_the_look_ahead_stops():
+    bench = Bench(jumps={100: 0.11})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "110 ms late" in outcome.reason
+    assert "look-ahead" in outcome.reason
+    assert len(bench.servo.sent) == 100
+    assert len(bench.rows) == 101
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_without_a_look_ahead_a_period_is_allowed():
+    assert Bench(jumps={100: 0.019}, lookahead=0.0).run().failure is None
+    assert isinstance(Bench(jumps={100: 0.021}, lookahead=0.0).run().failure, RefusedError)
+
+
+@pytest.mark.parametrize("mode", ["emergency stop", "protective stop", "fault", "not ready"])
+def test_any_mode_but_ready_stops_at_once(mode):
+    bench = Bench(at={200: lambda servo: setattr(servo, "mode", mode)})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert mode in outcome.reason
+    assert len(bench.servo.sent) == 200
+    last = bench.rows[-1]
+    assert last.state == mode
+    assert len(bench.rows) == 201
+    assert np.array_equal(last.sent[0], bench.servo.sent[-1][0])
+
+
+def test_a_refused_set_point_stops():
+    bench = Bench(at={150: lambda servo: setattr(servo, "accepts", False)})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, InstrumentError)
+    assert "refused" in outcome.reason
+    assert len(bench.servo.sent) == 150
+    assert bench.servo.calls == ["start", "stop"]
+
+
+def test_an_arm_that_stands_still_is_a_following_error():
+    bench = Bench(at={200: lambda servo: setattr(servo, "stuck", True)})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "following error" in outcome.reason
+    moved = np.linalg.norm(bench.servo.sent[-1][0] - bench.servo.position)
+    assert WATCH.following_error < moved < 20.0
+
+
+def test_an_arm_that_strays_is_a_following_error():
+    def push(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 5.1])
+
+    outcome = Bench(at={200: push}).run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "following error 5.1" in outcome.reason
+
+
+def test_an_arm_that_twists_is_a_following_error():
+    def twist(servo):
+        servo.stuck = True
+        servo.rotation = exp(np.array([0.0, 0.15, 0.0])) @ PEN_DOWN
+
+    outcome = Bench(at={200: twist}).run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "0.150 rad" in outcome.reason
+
+
+def test_the_delay_of_the_look_ahead_is_no_following_error():
+    """A stroke at 150 mm/s behind 0.2 s lags by 30 mm, along its own path."""
+
+    class Delayed(FakeServo):
+        def state(self):
+            state = super().state()
+            if len(self.sent) > 10:
+                self.position, self.rotation = self.sent[-11]
+                return type(state)(state.t, self.position, self.rotation, state.mode)
+            return type(state)(state.t, START, PEN_DOWN, state.mode)
+
+    bench = Bench(plan(stroke(duration=2.5)))
+    servo = Delayed(bench.clock)
+    loop = ServoLoop(bench.plan, WIDE, WATCH, ReadyArm(servo, servo.info, bench.clock))
+    assert loop.run(bench.interruption).reason == DONE
+    lag = np.linalg.norm([r.sent[0] - r.actual[0] for r in rows_of(loop.log)], axis=1)
+    assert lag.max() > 3 * WATCH.following_error
+    assert lag[-1] < 1e-9
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("at", [5, 200, 499])
+def test_a_signal_decelerates_along_the_path(number, at):
+    bench = Bench()
+    bench.servo.at[at] = lambda servo: bench.interruption.receive(number)
+    outcome = bench.run()
+    assert (outcome.signal, outcome.failure) == (number, None)
+    assert "decelerated" in outcome.reason
+    sent = np.array([row.sent[0] for row in bench.rows])
+    acceleration = np.diff(sent, 2, axis=0) / 0.02**2
+    assert np.linalg.norm(acceleration, axis=1).max() <= WIDE.acceleration
+    u = np.unwrap(np.arctan2(0, 1) + (START[0] - sent[:, 0]))
+    on_path = START[1] + 25.0 * np.sin(2 * np.pi * u / 109.0)
+    np.testing.assert_allclose(sent[:, 1], on_path, atol=1e-4)
+    assert {row.phase for row in bench.rows[at + 1 :]} <= {"stop"}
+    np.testing.assert_allclose(bench.rows[-1].actual[0], sent[-1])
+    if at < 499:
+        assert START[0] - sent[-1, 0] < 108.99
+
+
+def test_a_second_signal_stops_at_once():
+    bench = Bench(plan(stroke(duration=1.6)))
+    bench.servo.at[40] = lambda servo: bench.interruption.receive(signal.SIGINT)
+    bench.servo.at[42] = lambda servo: bench.interruption.receive(signal.SIGINT)
+    outcome = bench.run()
+    assert outcome.signal == signal.SIGINT
+    assert "second signal" in outcome.reason
+    assert len(bench.servo.sent) == 42
+    assert bench.servo.calls[-1] == "stop"
+
+
+@pytest.mark.parametrize("at", [501, 505, 510])
+def test_a_signal_after_the_last_set_point_ends_no_run_early(at):
+    bench = Bench(at={at: lambda servo: bench.interruption.receive(signal.SIGINT)})
+    outcome = bench.run()
+    assert (outcome.reason, outcome.signal, outcome.failure) == (DONE, None, None)
+    assert bench.loop.drawn == ["0"]
+
+
+def test_a_signal_while_the_arm_is_stopped_after_its_end_is_none():
+    bench = Bench()
+    bench.servo.stop = lambda: bench.interruption.receive(signal.SIGINT)
+    assert (bench.run().reason, bench.interruption.count) == (DONE, 1)
+
+
+def test_a_second_signal_stops_at_once_at_the_end_too():
+    def twice(servo):
+        bench.interruption.receive(signal.SIGINT)
+        bench.interruption.receive(signal.SIGINT)
+
+    bench = Bench(at={505: twice})
+    outcome = bench.run()
+    assert outcome.signal == signal.SIGINT
+    assert "second signal" in outcome.reason
+
+
+def test_an_emergency_stop_outweighs_a_signal():
+    def both(servo):
+        bench.interruption.receive(signal.SIGINT)
+        servo.mode = "emergency stop"
+
+    bench = Bench(at={60: both})
+    outcome = bench.run()
+    assert (type(outcome.failure), outcome.signal) == (RefusedError, None)
+
+
+def test_an_instrument_that_fails_keeps_the_rows_and_stops_the_arm():
+    def fail(servo):
+        raise InstrumentError("fake: connection lost")
+
+    bench = Bench(at={123: fail})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, InstrumentError)
+    assert outcome.reason == "fake: connection lost"
+    assert len(bench.rows) == 123
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_an_arm_that_cannot_be_stopped_is_a_failure_with_its_rows():
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    bench = Bench()
+    bench.servo.stop = unreachable
+    outcome = bench.run()
+    assert outcome.reason == "fake: does not answer"
+    assert isinstance(outcome.failure, InstrumentError)
+    assert len(bench.rows) > 500
+
+
+def test_a_defect_is_raised_but_the_arm_is_stopped():
+    def defect(servo):
+        raise ZeroDivisionError
+
+    bench = Bench(at={10: defect})
+    with pytest.raises(ZeroDivisionError):
+        bench.run()
+    assert bench.servo.calls[-1] == "stop"
+    assert len(bench.rows) == 10
+
+
+def test_an_arm_that_never_rests_is_reported():
+    def shake(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 0.2 * (-1) ** servo.reads])
+        servo.at[servo.reads] = shake
+
+    outcome = Bench(at={502: shake}).run()
+    assert isinstance(outcome.failure, InstrumentError)
+    assert "does not come to rest" in outcome.reason
+
+
+# --- with the force coupling
+
+UP = (0.0, 0.0, 1.0)
+
+
+def pressing(**options):
+    return Bench(plan(stroke(normal=UP)), presses=True, **options)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_it_seeks_contact_ends_the_seeking(number):
+    """Seeking goes on at 2.5 mm/s towards the surface; from the signal on nothing may move."""
+    bench = pressing(at={40: lambda servo: bench.interruption.receive(number)})
+    outcome = bench.run()
+    assert (outcome.signal, outcome.failure) == (number, None)
+    depth = START[2] - np.array([row.sent[0][2] for row in bench.rows])
+    assert depth[39] > 1.0
+    np.testing.assert_array_equal(depth[40:], depth[39])
+    assert len(depth) < 40 + 50
+
+
+def test_a_signal_on_the_stroke_freezes_the_displacement():
+    bench = pressing(at={200: lambda servo: bench.interruption.receive(signal.SIGINT)})
+    bench.sensor.wrench = np.array([0.0, 0.0, 5.1, 0.0, 0.0, 0.0])
+    assert bench.run().signal == signal.SIGINT
+    off = np.array([row.sent[0][2] - row.planned[0][2] for row in bench.rows])
+    assert bench.rows[199].phase == "stroke"
+    np.testing.assert_allclose(off[200:], off[199], atol=1e-12)
+
+
+def test_a_stale_sensor_does_not_drive_the_coupling():
+    """Four cycles of silence are no contact lost: the displacement waits for the next sample."""
+    bench = pressing()
+    bench.servo.at = {
+        100: lambda servo: setattr(bench.sensor, "silent", True),
+        104: lambda servo: setattr(bench.sensor, "silent", False),
+    }
+    bench.sensor.wrench = np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
+    bench.run()
+    rows = bench.rows
+    assert [row.wrench is None for row in rows[100:105]] == [False, False, True, True, False]
+    assert rows[102].coupling == rows[103].coupling == rows[101].coupling
+    assert rows[101].coupling < rows[100].coupling
+
+
+def test_a_displacement_out_of_the_workspace_is_not_sent():
+    box = (-900.0, 0.0, 0.0, 900.0, START[2] - 1.5, 100.0)
+    bench = pressing(limits=dataclasses.replace(WIDE, workspace=box))
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "workspace" in outcome.reason
+    assert min(p[2] for p, _ in bench.servo.sent) >= box[4]
+    assert len(bench.rows) == len(bench.servo.sent) + 1
+
+
+def test_a_displacement_faster_than_the_limit_is_not_sent():
+    limits = dataclasses.replace(WIDE, speed=2.0)
+    outcome = pressing(limits=limits).run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "next set-point would take 2." in outcome.reason
+
+
+def test_an_arm_outside_the_workspace_stops():
+    box = (-900.0, 0.0, 0.0, 900.0, START[2] - 1.0, START[2] + 1.0)
+
+    def push(servo):
+        servo.stuck = True
+        servo.position = servo.sent[-1][0] + np.array([0.0, 0.0, 1.2])
+
+    bench = Bench(limits=dataclasses.replace(WIDE, workspace=box), at={200: push})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "the tool at z" in outcome.reason
+    assert len(bench.servo.sent) == 200
+
+
+# --- what is not a number passes no guard
+
+
+@pytest.mark.parametrize("attribute", ["position", "rotation"])
+def test_a_pose_that_is_not_a_number_stops(attribute):
+    def lost(servo):
+        servo.stuck = True
+        setattr(servo, attribute, np.full_like(getattr(servo, attribute), np.nan))
+
+    bench = Bench(at={200: lost})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, InstrumentError)
+    assert "not a number" in outcome.reason
+    assert len(bench.servo.sent) == 200
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_wrench_that_is_not_a_number_stops(value):
+    bench = pressing()
+    wrench = np.array([0.0, 0.0, value, 0.0, 0.0, 0.0])
+    bench.servo.at = {30: lambda servo: setattr(bench.sensor, "wrench", wrench)}
+    outcome = bench.run()
+    assert isinstance(outcome.failure, InstrumentError)
+    assert len(bench.servo.sent) == 30
+
+
+def test_a_set_point_that_is_not_a_number_is_never_sent():
+    made = plan()
+    made.position[300] = np.nan
+    bench = Bench(made)
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert len(bench.servo.sent) == 300
+    assert bench.servo.calls[-1] == "stop"
+
+
+def test_the_first_failure_is_the_one_told():
+    def unreachable():
+        raise InstrumentError("fake: does not answer")
+
+    bench = Bench(at={200: lambda servo: setattr(servo, "mode", "fault")})
+    bench.servo.stop = unreachable
+    assert "fault" in bench.run().reason
+
+
+# --- limits in motion, and what hinders the run
+
+
+def test_a_set_point_that_would_accelerate_too_much_is_not_sent():
+    """A set-point 0.9 mm off its path is 45 mm/s of speed, and 2250 mm/s² twice over."""
+    made = plan()
+    made.position[300] += [0.0, 0.0, 0.99]
+    bench = Bench(made)
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "mm/s²" in outcome.reason
+    assert len(bench.servo.sent) == 300
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", range(3, 78, 5))
+def test_braking_never_breaks_the_limit_that_the_plan_keeps(at):
+    """A stroke that takes nearly all of its acceleration, stopped anywhere on it."""
+    made = plan(stroke(duration=1.6))
+    most = float(made.sizes[1][:, 0].max())
+    bench = Bench(made, limits=dataclasses.replace(WIDE, acceleration=1.001 * most))
+    bench.servo.at[at] = lambda servo: bench.interruption.receive(signal.SIGINT)
+    outcome = bench.run()
+    assert (outcome.failure, outcome.signal) == (None, signal.SIGINT)
+
+
+def test_a_torque_over_the_limit_stops():
+    bench = pressing()
+    wrench = np.array([0.0, 0.0, 2.0, 0.0, 5.1, 0.0])
+    bench.servo.at = {30: lambda servo: setattr(bench.sensor, "wrench", wrench)}
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "torque 5.1 N·m on the tool is over 5 N·m" in outcome.reason
+    assert len(bench.servo.sent) == 30
+
+
+def test_a_hindrance_decelerates_and_is_what_the_run_ends_with():
+    bench = Bench()
+    full = InstrumentError("run.journal: No space left on device")
+    loop = ServoLoop(
+        bench.plan,
+        WIDE,
+        WATCH,
+        ReadyArm(bench.servo, bench.servo.info, bench.clock),
+        hindrance=lambda: full if len(bench.servo.sent) >= 200 else None,
+    )
+    outcome = loop.run(bench.interruption)
+    assert outcome.failure is full
+    rows = rows_of(loop.log)
+    assert {row.phase for row in rows[200:]} == {"stop"}
+    sent = np.array([row.sent[0] for row in rows])
+    assert np.linalg.norm(np.diff(sent, 2, axis=0), axis=1).max() / PERIOD**2 <= WIDE.acceleration
+    assert len(rows) < 300

@@ -1,0 +1,79 @@
+import os
+import signal
+
+import pytest
+
+from dmpcli.control.signals import Interruption
+
+COUNTED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
+@pytest.fixture(autouse=True)
+def usual():
+    """Handlers as a shell leaves them; nohup and the background hand down others."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def handlers():
+    return [signal.getsignal(n) for n in (*COUNTED, signal.SIGTSTP)]
+
+
+def test_signals_are_counted_while_it_is_entered():
+    with Interruption() as interruption:
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert (interruption.number, interruption.count) == (signal.SIGTERM, 1)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert (interruption.number, interruption.count) == (signal.SIGTERM, 2)
+
+
+@pytest.mark.parametrize("number", COUNTED)
+def test_a_closed_terminal_is_a_signal_like_any_other(number):
+    with Interruption() as interruption:
+        assert signal.getsignal(number) == interruption.receive
+        os.kill(os.getpid(), number)
+        assert (interruption.number, interruption.count) == (number, 1)
+
+
+def test_it_cannot_be_suspended_meanwhile():
+    with Interruption() as interruption:
+        assert signal.getsignal(signal.SIGTSTP) == signal.SIG_IGN
+        os.kill(os.getpid(), signal.SIGTSTP)
+        assert interruption.count == 0
+
+
+def test_who_asked_to_outlive_the_terminal_does():
+    """Such as nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interruption() as interruption:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert interruption.count == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_handlers_are_put_back():
+    before = handlers()
+    with Interruption():
+        assert all(now != then for now, then in zip(handlers(), before, strict=True))
+    assert handlers() == before
+
+
+def test_the_third_signal_is_the_last_that_is_counted():
+    """Two stop the arm; if the process hangs even so, a fourth ends it."""
+    before = handlers()
+    with Interruption() as interruption:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) == interruption.receive
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interruption.count == 3
+        assert handlers()[:-1] == before[:-1]
+        assert signal.getsignal(signal.SIGTSTP) == signal.SIG_IGN
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert handlers() == before

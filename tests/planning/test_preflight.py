@@ -1,0 +1,153 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dmpcli.errors import RefusedError
+from dmpcli.planning import preflight
+from dmpcli.planning.plan import Stroke
+from tests.control.streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
+
+
+def failed(checks):
+    return [c.quantity for c in checks if not c.passed]
+
+
+def by_name(checks):
+    return {c.quantity: c for c in checks}
+
+
+def test_the_papers_stroke_passes():
+    source = stroke(turn=0.5)
+    checks = preflight.within_limits(plan(source), source, WIDE)
+    checks += preflight.at_rest(source, 1.0, 0.02, WIDE)
+    assert failed(checks) == []
+    refuse_any(checks)
+
+
+def test_peaks_are_those_of_the_closed_form():
+    """Straight minimum jerk: 1.875 L/T, 5.7735 L/T², 60 L/T³."""
+    source = stroke()
+    u = (START[0] - source.position[:, 0])[:, None]
+    straight = Stroke("0", source.t, START - u * np.array([1.0, 0, 0]), source.rotation)
+    checks = by_name(preflight.within_limits(plan(straight), straight, WIDE))
+    assert checks["speed"].value == pytest.approx(1.875 * LENGTH / 10, rel=1e-3)
+    assert checks["acceleration"].value == pytest.approx(5.7735 * LENGTH / 100, rel=1e-2)
+    assert checks["jerk"].value == pytest.approx(60 * LENGTH / 1000, rel=2e-2)
+    assert checks["speed"].t == pytest.approx(5.0, abs=0.02)
+    assert checks["speed"].row in (250, 251, 252)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "limit"),
+    [
+        ("speed", {"speed": 20.0}),
+        ("acceleration", {"acceleration": 5.0}),
+        ("jerk", {"jerk": 6.0}),
+        ("rotation speed", {"rotation_speed": 0.1}),
+        ("rotation acceleration", {"rotation_acceleration": 0.03}),
+        ("rotation jerk", {"rotation_jerk": 0.03}),
+    ],
+)
+def test_each_limit_is_kept_on_its_own(quantity, limit):
+    source = stroke(turn=0.8)
+    limits = dataclasses.replace(WIDE, **limit)
+    checks = preflight.within_limits(plan(source), source, limits)
+    assert failed(checks) == [quantity]
+    option = "--max-" + quantity.replace(" ", "-")
+    with pytest.raises(RefusedError, match=f"^{quantity} .* at t = .*row .* over.*{option}"):
+        refuse_any(checks)
+
+
+def test_the_speed_that_is_advised_passes():
+    source = stroke()
+    limits = dataclasses.replace(WIDE, speed=20.0, acceleration=4.0)
+    checks = by_name(preflight.within_limits(plan(source), source, limits))
+    for quantity in ("speed", "acceleration"):
+        factor = float(checks[quantity].remedy.split(" times")[0].split()[-1])
+        slower = preflight.within_limits(plan(source, speed=factor), source, limits)
+        assert by_name(slower)[quantity].passed
+
+
+def test_a_single_step_is_found_at_its_row():
+    source = stroke(first_row=1001)
+    position = source.position.copy()
+    position[300:] += np.array([0.0, 0.0, 3.0])
+    bad = dataclasses.replace(source, position=position)
+    check = by_name(preflight.within_limits(plan(bad), bad, WIDE))["acceleration"]
+    assert not check.passed
+    assert abs(check.row - 1301) <= 1
+    assert check.t == pytest.approx(6.0, abs=0.021)
+
+
+def test_workspace_names_axis_and_row():
+    source = stroke()
+    top = START[1] + 24.0
+    limits = dataclasses.replace(WIDE, workspace=(-900.0, 0.0, 0.0, top, -100.0, 100.0))
+    checks = preflight.within_limits(plan(source), source, limits)
+    assert failed(checks) == ["distance outside the workspace in y"]
+    assert by_name(checks)[failed(checks)[0]].value == pytest.approx(1.0, abs=1e-2)
+    roomy = dataclasses.replace(limits, workspace=(-900.0, 0.0, 0.0, top + 2, -100.0, 100.0))
+    assert failed(preflight.within_limits(plan(source), source, roomy)) == []
+
+
+def test_the_approach_is_checked_too():
+    source = stroke()
+    outside = START + np.array([20.0, 0.0, 0.0])
+    limits = dataclasses.replace(WIDE, workspace=(-900.0, START[0] + 1, 0.0, 900.0, -100.0, 100.0))
+    made = plan(source, start=(outside, PEN_DOWN), limits=limits)
+    checks = preflight.within_limits(made, source, limits)
+    assert failed(checks) == ["distance outside the workspace in x"]
+
+
+def cut(source, first, last):
+    return dataclasses.replace(
+        source,
+        t=source.t[first:last],
+        position=source.position[first:last],
+        rotation=None if source.rotation is None else source.rotation[first:last],
+    )
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "quantity", "option"),
+    [(200, 501, "speed at the start", "--ease-in"), (0, 300, "speed at the end", "--ease-out")],
+)
+def test_a_file_in_motion_at_an_end_is_refused_with_the_remedy(first, last, quantity, option):
+    checks = preflight.at_rest(cut(stroke(), first, last), 1.0, 0.02, WIDE)
+    assert failed(checks) == [quantity]
+    with pytest.raises(RefusedError, match=option):
+        refuse_any(checks)
+
+
+def test_rotation_in_motion_at_an_end_is_refused():
+    source = stroke(turn=1.0)
+    still = dataclasses.replace(source, position=np.broadcast_to(START, (501, 3)))
+    assert failed(preflight.at_rest(cut(still, 100, 501), 1.0, 0.02, WIDE)) == [
+        "rotation at the start"
+    ]
+
+
+def test_end_velocity_is_that_of_the_motion_and_goes_with_the_speed():
+    """v(t) = 2 + 3 t: the parabola through three samples is exact."""
+    t = np.arange(50) * 0.02
+    position = START + (2.0 * t + 1.5 * t**2)[:, None] * np.array([0.6, 0.8, 0.0])
+    source = Stroke("0", t, position)
+    start, end = preflight.at_rest(source, 1.0, 0.02, WIDE)
+    assert start.value == pytest.approx(2.0)
+    assert end.value == pytest.approx(2.0 + 3.0 * t[-1])
+    assert preflight.at_rest(source, 0.5, 0.02, WIDE)[0].value == pytest.approx(1.0)
+    assert start.limit == pytest.approx(0.2 * 2250.0 * 0.02)
+
+
+def test_the_arm_must_stand_at_the_start():
+    assert failed(preflight.near_start(1.9, 0.03, 2.0, 0.035)) == []
+    assert len(failed(preflight.near_start(2.1, 0.03, 2.0, 0.035))) == 1
+    assert len(failed(preflight.near_start(2.1, 0.04, 2.0, 0.035))) == 2
+    with pytest.raises(RefusedError, match="--approach"):
+        refuse_any(preflight.near_start(2.1, 0.0, 2.0, 0.035))
+
+
+def test_what_is_not_a_number_passes_no_check():
+    check = preflight.Check("speed", float("nan"), 250.0, "mm/s", None, None, "")
+    assert not check.passed
