@@ -1,3 +1,85 @@
-"""dmpcli: one drag-taught stroke, drawn anywhere a position-servo arm can reach."""
+"""dmpcli: one drag-taught stroke, drawn anywhere a position-servo arm can reach.
 
-__version__ = "0.1.0"
+The names below are the Python API, see docs/api.md; they are loaded when they are first used.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from dmpcli.version import __version__
+
+if TYPE_CHECKING:
+    from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
+    from dmpcli.primitives.skill import Skill
+    from dmpcli.spatial.trajectory import Trajectory
+    from dmpcli.surfaces.cylinder import Cylinder
+    from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.plane import Plane
+    from dmpcli.surfaces.sphere import Sphere
+    from dmpcli.workflows.library import (
+        fit,
+        generalize,
+        read,
+        read_surface,
+        wave_heights,
+        write,
+    )
+    from dmpcli.workflows.values import Demonstration, Run, TrajectoryBatch
+
+_HOMES = {
+    "DmpError": "errors",
+    "InputError": "errors",
+    "InstrumentError": "errors",
+    "RefusedError": "errors",
+    "Skill": "primitives.skill",
+    "Trajectory": "spatial.trajectory",
+    "Cylinder": "surfaces.cylinder",
+    "Mesh": "surfaces.mesh",
+    "Plane": "surfaces.plane",
+    "Sphere": "surfaces.sphere",
+    "Demonstration": "workflows.values",
+    "Run": "workflows.values",
+    "TrajectoryBatch": "workflows.values",
+    "fit": "workflows.library",
+    "generalize": "workflows.library",
+    "read": "workflows.library",
+    "read_surface": "workflows.library",
+    "wave_heights": "workflows.library",
+    "write": "workflows.library",
+}
+
+__all__ = [
+    "Cylinder",
+    "Demonstration",
+    "DmpError",
+    "InputError",
+    "InstrumentError",
+    "Mesh",
+    "Plane",
+    "RefusedError",
+    "Run",
+    "Skill",
+    "Sphere",
+    "Trajectory",
+    "TrajectoryBatch",
+    "__version__",
+    "fit",
+    "generalize",
+    "read",
+    "read_surface",
+    "wave_heights",
+    "write",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'dmpcli' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"dmpcli.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from dmpcli import __version__
 from dmpcli.commands import (
     calibrate,
     execute,
@@ -24,6 +23,7 @@ from dmpcli.commands import (
 )
 from dmpcli.commands.pose_words import joined
 from dmpcli.errors import DmpError
+from dmpcli.version import __version__
 
 
 class Group(TyperGroup):

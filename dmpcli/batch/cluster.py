@@ -16,10 +16,11 @@ import numpy as np
 import pyarrow as pa
 import scipy
 
-from dmpcli import __version__, extras
+from dmpcli import extras
 from dmpcli.batch.job import Job, Outcome, Part, draw_part
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import DmpError, InputError, InstrumentError
+from dmpcli.version import __version__
 
 PATIENCE = 5.0
 """How long a scheduler may take to answer, s."""

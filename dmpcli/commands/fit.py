@@ -11,8 +11,7 @@ from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.fit_result import Fit
-    from dmpcli.records import skill as skill_file
+    pass
 
 
 def command(
@@ -106,22 +105,18 @@ def command(
 ) -> None:
     """Learn a skill from one or several demonstrations."""
     on_terminal(quiet)
-    from dmpcli.errors import about
-    from dmpcli.messages import tell, warn
-    from dmpcli.primitives.learning import fit
-    from dmpcli.primitives.skill import TaughtSurface
-    from dmpcli.records import skill, streams
+    from dmpcli.messages import tell
+    from dmpcli.records import streams
     from dmpcli.records.fit_settings import FitSettings
-    from dmpcli.records.record import Provenance
     from dmpcli.records.settings import resolve
     from dmpcli.workflows import surface_input
-    from dmpcli.workflows.fit_messages import cautions, summary
+    from dmpcli.workflows.fit import check_said, learn
+    from dmpcli.workflows.fit_messages import summary
 
-    if forcing_scale is not None and model == "modified":
-        raise InputError("--forcing-scale: belongs to --model original; leave it out")
     surface_input.check_options(surface, surface_pose, surface_unit)
-    if surface is not None and normal is not None:
-        raise InputError("--surface and --normal both say what the stroke was taught on; give one")
+    check_said(
+        {"forcing_scale": forcing_scale, "model": model, "normal": normal}, surface is not None
+    )
     settings = resolve(
         FitSettings,
         "fit",
@@ -164,30 +159,13 @@ def command(
         raise InputError("-: standard input can be read only once")
     sources = [streams.read(path) for path in demonstrations]
     strokes = [recording_options.recording(source, form) for source in sources]
-    options = settings.model_dump()
-    if form is not None:
-        options["layout"] = form.as_options()
-    inputs = [{"role": "demonstration", "sha256": s.sha256} for s in sources]
-    taught_on, taught = None, None
+    named = None
     if surface is not None:
         named = surface_input.read(surface, surface_pose, surface_unit, summary=True)
-        options |= named.options | {"surface_unit": named.unit}
-        inputs += named.inputs
-        taught_on, taught = named.surface, TaughtSurface(named.kind, named.facts)
+    learned, result = learn(sources, strokes, settings, form, named)
+    streams.write(output, learned.content)
     names = [source.name for source in sources]
-    with about(", ".join(names)):
-        result = fit(strokes, settings.choices(), taught_on, taught)
-    streams.write(
-        output,
-        skill.encode(
-            result.skill,
-            _reproductions([source.sha256 for source in sources], result),
-            Provenance("fit", options, tuple(inputs)),
-        ),
-    )
     tell(summary(streams.shown(output, output=True), names, result))
-    for line in cautions(names, result):
-        warn(line)
 
 
 def _number(basis: str | None) -> int | str | None:
@@ -198,23 +176,3 @@ def _number(basis: str | None) -> int | str | None:
         return int(basis)
     except ValueError:
         raise InputError(f"--basis {basis}: must be auto, or a number of functions") from None
-
-
-def _reproductions(hashes: list[str], result: "Fit") -> "list[skill_file.Reproduction]":
-    from dmpcli.records import skill
-
-    return [
-        skill.Reproduction(
-            sha256=sha256,
-            duration=prepared.stroke.duration,
-            rms=r.rms,
-            largest=r.largest,
-            end=r.end,
-            smoothing=prepared.removed,
-            wave=r.wave,
-            angle=r.angle,
-            noise=0.0 if prepared.seen is None else prepared.seen.sigma,
-            cutoff=prepared.cutoff,
-        )
-        for sha256, prepared, r in zip(hashes, result.prepared, result.reproductions, strict=True)
-    ]

@@ -8,7 +8,6 @@ from typing import TextIO
 
 from rich.table import Table
 
-from dmpcli import __version__
 from dmpcli.figures import contact, measured, paper_tables, ranking, tables
 from dmpcli.figures.batch import Many
 from dmpcli.figures.measured import Row
@@ -20,6 +19,7 @@ from dmpcli.records.dataset import Batch
 from dmpcli.records.lesson import Lesson
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
+from dmpcli.version import __version__
 
 NAME, VERSION = "report", 1
 UNITS = {

@@ -6,13 +6,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from dmpcli import __version__, rotations
+from dmpcli import rotations
 from dmpcli.errors import InputError
 from dmpcli.records import documents, streams
 from dmpcli.records.documents import Part
 from dmpcli.records.schemas import EULER, FRAME
 from dmpcli.records.streams import Source
 from dmpcli.spatial.pose import Pose
+from dmpcli.version import __version__
 
 SCHEMA = "pose"
 VERSION = 1

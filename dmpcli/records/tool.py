@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
-from dmpcli import __version__
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.primitives.identification import Identification
@@ -22,6 +21,7 @@ from dmpcli.records.documents import Part
 from dmpcli.records.schemas import EULER
 from dmpcli.records.streams import Source
 from dmpcli.rotations import from_euler, to_euler
+from dmpcli.version import __version__
 
 SCHEMA = "tool"
 VERSION = 2

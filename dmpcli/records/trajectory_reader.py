@@ -38,6 +38,7 @@ class StoredTrajectory(Trajectory):
 
 def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
     """Return the rows of each id, in order of first appearance."""
+    ids = np.asarray(ids, dtype=object)  # of a record that is not yet written an Arrow array
     borders = np.flatnonzero(np.concatenate([[True], ids[1:] != ids[:-1], [True]]))
     runs: dict[str, list[Integers]] = {}
     for first, last in pairwise(borders.tolist()):

@@ -1,8 +1,11 @@
 """The surface that ``--surface`` names, with ``--surface-pose`` and ``--surface-unit``."""
 
+import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from dmpcli.errors import InputError
 
@@ -11,6 +14,8 @@ if TYPE_CHECKING:
     from dmpcli.records.streams import Source
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.protocol import Surface
+
+_READ = "_read_from"
 
 
 @dataclass(frozen=True)
@@ -164,3 +169,25 @@ def _agreed(name: str, file: "PoseFile", part: "Source", unit: str | None) -> st
             "--surface-unit out, or register the part anew with --unit"
         )
     return file.unit
+
+
+def remember(found: SurfaceInput) -> None:
+    """Let a surface tell which file it was read from, for the provenance of what is drawn on it."""
+    object.__setattr__(found.surface, _READ, found)
+
+
+def remembered(surface: "Surface") -> SurfaceInput:
+    """Return a surface with where it came from; one that was made of arrays has their hash."""
+    from dmpcli.records import surface as surface_file
+    from dmpcli.surfaces.mesh import Mesh
+
+    found: SurfaceInput | None = getattr(surface, _READ, None)
+    if found is not None:
+        return found
+    mesh = isinstance(surface, Mesh)
+    own = (surface.V, surface.F) if isinstance(surface, Mesh) else vars(surface).values()
+    digest = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in own))
+    kind = surface_file.MESH if mesh else surface_file.kind(surface)  # type: ignore[arg-type]
+    sha256 = digest.hexdigest()
+    inputs = [{"role": "surface", "sha256": sha256}]
+    return SurfaceInput(Path(kind), surface, kind, sha256, "mm", None, {}, inputs)

@@ -474,7 +474,7 @@ def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_pa
 def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
     out = tmp_path / "run.parquet"
     out.write_bytes(b"older")
-    request = Request(str(traj), (), str(out), "mock:", None, None, None, *[False] * 5)
+    request = Request(str(traj), (), str(out), "mock:", None, None, None, *[False] * 4)
     with pytest.raises(InputError, match="--force replaces it"):
         _check_output(request, repeatable=False)
     _check_output(dataclasses.replace(request, force=True), repeatable=False)

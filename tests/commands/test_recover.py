@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 from dmpcli.cli import app
 from dmpcli.control import demonstration_log
 from dmpcli.errors import InputError, InstrumentError
+from dmpcli.messages import on_terminal
 from dmpcli.records import journal, record, schemas, streams
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, Record
@@ -80,7 +81,7 @@ def test_a_broken_end_is_left_out_and_said(drawn, tmp_path):
 def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_path, monkeypatch):
     """The output's folder is full when the run ends; afterwards there is room."""
     out = tmp_path / "a.parquet"
-    keeper = Keeper(str(out), realtime=True, quiet=True)
+    keeper = Keeper(str(out), realtime=True)
     rows = Rows(drawn.rows.groups)
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 70), {})
@@ -104,7 +105,8 @@ def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_p
 
 
 def test_another_failure_is_told_after_the_one_of_the_file(drawn, tmp_path, monkeypatch, capsys):
-    keeper = Keeper(str(tmp_path / "a"), realtime=True, quiet=True)
+    on_terminal(quiet=False)
+    keeper = Keeper(str(tmp_path / "a"), realtime=True)
     rows = Rows(drawn.rows.groups)
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 5), {})
@@ -116,10 +118,11 @@ def test_another_failure_is_told_after_the_one_of_the_file(drawn, tmp_path, monk
 
 
 def test_simulated_time_has_no_journal_and_a_pipe_says_so(drawn, tmp_path, capsys):
-    keeper = Keeper(str(tmp_path / "a"), realtime=False, quiet=False)
+    on_terminal(quiet=False)
+    keeper = Keeper(str(tmp_path / "a"), realtime=False)
     keeper.begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
     assert list(tmp_path.iterdir()) == []
-    Keeper("-", realtime=True, quiet=False).begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
+    Keeper("-", realtime=True).begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
     assert "no journal" in capsys.readouterr().err
     assert keeper.hindrance() is None
 

@@ -1,0 +1,292 @@
+"""The Python API: what the subcommands do, on values and arrays; everything in mm, s and rad.
+
+What the command line refuses raises the same error with the same text. What it tells goes to the
+logger ``dmpcli``.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.primitives.drawn_strokes import OnBorder
+from dmpcli.primitives.generalization import Pairs
+from dmpcli.primitives.skill import Skill
+from dmpcli.records import learned_skill, record, recordings, schemas, streams
+from dmpcli.records.fit_settings import FitSettings
+from dmpcli.records.generalize_settings import GeneralizeSettings
+from dmpcli.records.learned_skill import LearnedSkill
+from dmpcli.records.pairs import FARTHEST, OK, PairTable
+from dmpcli.records.settings import resolve
+from dmpcli.rotations import to_euler
+from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.surfaces.protocol import Surface
+from dmpcli.workflows import batches, process, single, surface_input, values
+from dmpcli.workflows.fit import check_said, learn
+from dmpcli.workflows.generalize import Order, prepared
+from dmpcli.workflows.generalize_inputs import one_pair
+from dmpcli.workflows.ranges import within
+from dmpcli.workflows.surface_input import SurfaceInput
+from dmpcli.workflows.values import Demonstration, DrawnTrajectory, Run, TrajectoryBatch
+
+MANY = "start and goal"
+"""What messages call a table of pairs that was given as arrays."""
+
+
+def read(path: str | Path, layout: str | None = None, **said: Any) -> Any:
+    """Read a file of dmpcli's, or a recording of another program.
+
+    Parameters
+    ----------
+    path : str or Path
+        A recording, skill, trajectory, run, or the folder of a batch.
+    layout : str, optional
+        Of another program's recording; see ``dmpcli fit --help``.
+    **said
+        ``length, time, angle`` (units), ``rotation``, ``sample_rate``, ``body``, ``repeated``,
+        ``decimal``: as the options of ``fit``.
+
+    Returns
+    -------
+    Demonstration, Skill, Trajectory, TrajectoryBatch or Run
+        By what the file says.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    if Path(path).is_dir():
+        return values.batch_in(Path(path))
+    source = streams.read(path)
+    if source.content.lstrip()[:1] == b"{":
+        return learned_skill.read(source)
+    if record.is_ours(source):
+        found = record.decode(source)
+        if found.schema is schemas.TRAJECTORY:
+            return values.of_record(found)
+        if found.schema is schemas.RUN:
+            return Run(found.t, found.position(), found.rotation(), record=found)
+        if found.schema is not schemas.DEMONSTRATION:
+            raise InputError(f"{path}: is a {found.schema.name} file, which holds no stroke")
+    return values.demonstration(source, values.layout_of(layout, said))
+
+
+def write(value: Any, path: str | Path) -> None:
+    """Write a value as the command line does; the file is whole or not there.
+
+    Parameters
+    ----------
+    value : Demonstration, Skill, Trajectory, TrajectoryBatch or Run
+    path : str or Path
+        Of a batch the folder.
+
+    Raises
+    ------
+    InputError
+        It cannot be written, or is none of these.
+    """
+    if isinstance(value, TrajectoryBatch):
+        if value.ready is None:
+            raise InputError(f"{path}: this batch was read from a folder; copy that one")
+        batches.write(value.ready, Path(path), batches.Wanted(stop=False))
+        return
+    if isinstance(value, LearnedSkill):
+        content = value.content
+    elif isinstance(value, Skill):
+        raise InputError(f"{path}: only a skill that `fit` or `read` gave can be written")
+    elif isinstance(value, Demonstration):
+        content = value.file().content
+    elif isinstance(value, Trajectory):
+        content = record.encode(values.record_of(value))
+    else:
+        raise InputError(f"{path}: a {type(value).__name__} is nothing that can be written")
+    streams.write(path, content)
+
+
+def read_surface(
+    path: str | Path, pose: str | Sequence[float] | None = None, unit: str | None = None
+) -> Surface:
+    """Read a surface: a plane, cylinder or sphere file, or a mesh.
+
+    Parameters
+    ----------
+    path : str or Path
+    pose : str or sequence of float, optional
+        Where its own frame lies in the base frame: ``X Y Z RX RY RZ``, mm and rad, or a pose file.
+    unit : str, optional
+        Of a mesh file's lengths.
+
+    Raises
+    ------
+    InputError
+        It cannot be read or is none of them.
+    """
+    if pose is not None and not isinstance(pose, str):
+        pose = " ".join(repr(float(value)) for value in pose)
+    found = surface_input.read(Path(path), pose, unit)
+    surface_input.remember(found)
+    return found.surface
+
+
+def fit(
+    demonstrations: Demonstration | Sequence[Demonstration],
+    surface: Surface | None = None,
+    preset: str = "default",
+    **settings: Any,
+) -> LearnedSkill:
+    """Learn a skill from one or several demonstrations.
+
+    Parameters
+    ----------
+    demonstrations : Demonstration, or several
+    surface : Surface, optional
+        What the stroke was taught on.
+    preset : str
+        ``default``, ``paper``, or a TOML file.
+    **settings
+        The options of ``dmpcli fit``, with underscores.
+
+    Raises
+    ------
+    InputError, RefusedError
+        As ``dmpcli fit``.
+    """
+    several = demonstrations
+    several = [several] if isinstance(several, Demonstration) else list(several)
+    if not several:
+        raise InputError("there is no demonstration to learn from; give at least one")
+    check_said(settings, surface is not None)
+    resolved = resolve(FitSettings, "fit", settings, preset)
+    files = [one.file() for one in several]
+    forms = [one.layout for one in several]
+    strokes = [recordings.read(file, form).stroke for file, form in zip(files, forms, strict=True)]
+    skill, _ = learn(files, strokes, resolved, forms[0], _named(surface))
+    return skill
+
+
+def generalize(
+    skill: LearnedSkill,
+    start: ArrayLike,
+    goal: ArrayLike,
+    surface: Surface | None = None,
+    *,
+    start_rotation: ArrayLike | None = None,
+    goal_rotation: ArrayLike | None = None,
+    in_: Literal["base", "part"] = "base",
+    on_border: OnBorder = "fail",
+    keep_out: str | Path | None = None,
+    robot_model: str | None = None,
+    tool: str | Path | None = None,
+    preset: str | None = None,
+    **settings: Any,
+) -> "DrawnTrajectory | TrajectoryBatch":
+    """Draw a skill at new start and goal points.
+
+    Parameters
+    ----------
+    skill : Skill
+        Of `fit` or `read`.
+    start, goal : array, shape (3,) or (B, 3)
+        mm.
+    surface : Surface, optional
+        What to draw on.
+    start_rotation, goal_rotation : array, shape (3, 3) or (B, 3, 3), optional
+        Of the tool.
+    in_, on_border, keep_out, robot_model, tool, preset
+        As the options of ``dmpcli generalize``.
+    **settings
+        Its other options, with underscores.
+
+    Returns
+    -------
+    Trajectory or TrajectoryBatch
+        Of one pair its trajectory, unless it is drawn in copies or pieces.
+
+    Raises
+    ------
+    InputError, RefusedError
+        As ``dmpcli generalize``; of a pair among many its status says it.
+    """
+    resolved = resolve(GeneralizeSettings, "generalize", settings, preset)
+    lines = None if keep_out is None else Path(keep_out)
+    named = _named(surface)
+    process.check(resolved, settings.get("orientation"), _path_of(named), lines)
+    first, last = _points("start", start), _points("goal", goal)
+    if first.shape != last.shape:
+        raise InputError(f"start and goal: shapes {first.shape} and {last.shape} differ")
+    within("--start", first.ravel().tolist(), FARTHEST)
+    within("--goal", last.ravel().tolist(), FARTHEST)
+    rotations = [
+        _rotations(name, R, first.shape[:-1])
+        for name, R in (("start_rotation", start_rotation), ("goal_rotation", goal_rotation))
+    ]
+    options: dict[str, Any] = {}
+    if first.ndim == 1:
+        angles = [None if R is None else tuple(to_euler(R).tolist()) for R in rotations]
+        table = one_pair(tuple(first.tolist()), tuple(last.tolist()), *angles)
+        options = dict(zip(("start_orientation", "goal_orientation"), angles, strict=True))
+    else:
+        count = len(first)
+        ids = [str(i + 1) for i in range(count)]
+        pairs = Pairs(first, last, *rotations)
+        table = PairTable(MANY, ids, pairs, None, np.full(count, np.nan), [OK] * count)
+        options = batches.Wanted(stop=False).options
+    order = Order(
+        skill,
+        table,
+        resolved,
+        named,
+        in_,
+        on_border,
+        lines,
+        robot_model,
+        None if tool is None else Path(tool),
+        first.ndim == 1,
+        options,
+    )
+    ready = prepared(order)
+    if first.ndim == 1:
+        return values.of_record(single.draw_one(ready).record)
+    return values.drawn_batch(ready)
+
+
+def wave_heights(stroke: Trajectory) -> Floats:
+    """Heights between consecutive extrema across the start-goal line, mm; none of a line.
+
+    Parameters
+    ----------
+    stroke : Demonstration, Trajectory or Run
+        A demonstration is seen as `fit` sees it.
+    """
+    return values.measured(stroke).wave.heights
+
+
+def _named(surface: Surface | None) -> SurfaceInput | None:
+    return None if surface is None else surface_input.remembered(surface)
+
+
+def _path_of(named: SurfaceInput | None) -> Path | None:
+    return None if named is None else named.path
+
+
+def _points(name: str, given: ArrayLike) -> Floats:
+    points = np.asarray(given, dtype=float)
+    if points.ndim not in (1, 2) or points.shape[-1] != 3:
+        raise InputError(f"{name}: shape {points.shape} is neither (3,) nor (B, 3)")
+    return points
+
+
+def _rotations(name: str, given: ArrayLike | None, lead: tuple[int, ...]) -> Floats | None:
+    if given is None:
+        return None
+    R = np.asarray(given, dtype=float)
+    if R.shape != (*lead, 3, 3):
+        raise InputError(f"{name}: shape {R.shape} is not {(*lead, 3, 3)}")
+    if np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max() > 1e-6 or (np.linalg.det(R) < 0).any():
+        raise InputError(f"{name}: is no rotation")
+    return R

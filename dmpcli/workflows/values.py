@@ -1,0 +1,250 @@
+"""The values of the Python API: demonstrations, trajectories, batches and runs."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import Floats, Integers
+from dmpcli.batch.job import settle
+from dmpcli.errors import InputError, about
+from dmpcli.figures.recorded import Recorded
+from dmpcli.figures.stroke import Stroke
+from dmpcli.figures.strokes import strokes_of
+from dmpcli.messages import tell, warn
+from dmpcli.primitives.admission import snapped
+from dmpcli.primitives.drawing import draw
+from dmpcli.records import layouts, record, recordings, schemas, streams
+from dmpcli.records.layouts import Layout
+from dmpcli.records.pairs import OK
+from dmpcli.records.record import Provenance, Record
+from dmpcli.records.streams import Source
+from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
+from dmpcli.rotations import from_euler, to_euler
+from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.workflows.generalize import Ready
+
+
+@dataclass(frozen=True)
+class Demonstration(Trajectory):
+    """What the tool did while it was dragged; from arrays, or of a file.
+
+    Attributes
+    ----------
+    source : Source, optional
+        The file that it was read from.
+    layout : Layout, optional
+        How that is read, where it is not dmpcli's own.
+    """
+
+    source: Source | None = field(default=None, repr=False, compare=False)
+    layout: Layout | None = field(default=None, repr=False, compare=False)
+
+    def file(self) -> Source:
+        """Return its file; of arrays the one that they would be written as."""
+        if self.source is not None:
+            return self.source
+        columns = _columns(self)
+        made = Record(schemas.DEMONSTRATION, columns, Provenance("Demonstration"))
+        return Source("demonstration", record.encode(made))
+
+
+@dataclass(frozen=True)
+class DrawnTrajectory(StoredTrajectory):
+    """A trajectory with the record that it is written as."""
+
+    record: Record | None = field(default=None, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class Run(Trajectory):
+    """What an arm did; the record holds what was planned and sent, and when."""
+
+    record: Record | None = field(default=None, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class TrajectoryBatch(Trajectory):
+    """Trajectories of many pairs, padded with NaN to the longest one.
+
+    Attributes
+    ----------
+    t : array, shape (T,)
+        Of the longest one, s; all have the same rate.
+    position, rotation, normal
+        With a leading axis, B.
+    status : list of str, length B
+        ``ok``, or why there is no trajectory.
+    length : array of int, shape (B,)
+        Samples of each.
+    ids : list of str, length B
+    ready : Ready, optional
+        What it was drawn from.
+    """
+
+    status: list[str] = field(default_factory=list)
+    length: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    ids: list[str] = field(default_factory=list)
+    ready: Ready | None = field(default=None, repr=False, compare=False)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __getitem__(self, i: int) -> Trajectory:
+        n = int(self.length[i])
+        return Trajectory(
+            self.t[:n],
+            self.position[i, :n],
+            None if self.rotation is None else self.rotation[i, :n],
+            None if self.normal is None else self.normal[i, :n],
+        )
+
+
+def layout_of(name: str | None, said: dict[str, Any]) -> Layout | None:
+    """Return the layout that the words of `read` describe; None where they say nothing.
+
+    Raises
+    ------
+    InputError
+        There is no such layout.
+    """
+    if name is None and not said:
+        return None
+    if name is not None and name not in layouts.LAYOUTS:
+        raise InputError(f"--layout {name}: no such layout; there are {', '.join(layouts.LAYOUTS)}")
+    base = layouts.LAYOUTS[name] if name else Layout()
+    return layouts.adapted(base, [], said)
+
+
+def demonstration(source: Source, form: Layout | None) -> Demonstration:
+    """Read a recording, and say how it was read and what is doubtful about it."""
+    found = recordings.read(source, form)
+    for remark in found.told:
+        tell(f"{source.name}: {remark}")
+    for doubt in found.doubts:
+        warn(f"{source.name}: {doubt}")
+    stroke = found.stroke
+    layout = None if found.ours else form
+    return Demonstration(stroke.t, stroke.position, stroke.rotation, source=source, layout=layout)
+
+
+def of_record(found: Record) -> DrawnTrajectory | TrajectoryBatch:
+    """Return the trajectory of a trajectory file, or as a batch those of several ids."""
+    strokes = [stored(found, name, rows) for name, rows in rows_by_id(found.columns["id"]).items()]
+    if len(strokes) > 1:
+        return _padded(list(strokes), [one.id for one in strokes], [OK] * len(strokes))
+    [one] = strokes
+    return DrawnTrajectory(
+        one.t, one.position, one.rotation, one.normal, one.id, one.first_row, one.facts, found
+    )
+
+
+def batch_in(folder: Path) -> TrajectoryBatch:
+    """Read the folder of a batch whole."""
+    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
+    known: dict[str, Trajectory] = {}
+    parts = [part for part in pairs.columns.get("part", ()) if part]
+    for name in dict.fromkeys(map(str, parts)):
+        part = record.decode(streams.read(folder / name), schemas.TRAJECTORY)
+        for key, rows in rows_by_id(part.columns["id"]).items():
+            known[key] = stored(part, key, rows)
+    ids = [str(name) for name in pairs.columns["id"]]
+    return _padded([known.get(name) for name in ids], ids, list(map(str, pairs.columns["status"])))
+
+
+def drawn_batch(ready: Ready) -> TrajectoryBatch:
+    """Draw all pairs that can be drawn; the others have NaN and a status."""
+    task, table = ready.task, ready.table
+    good = np.flatnonzero(table.good)
+    pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
+    with about("skill"):
+        drawn = draw(task.skill, pairs[good], ready.duration[good], task.surface, task.style)
+    found = {
+        int(row): one
+        for row, one in zip(
+            good, settle(task, [table.ids[row] for row in good], drawn), strict=True
+        )
+    }
+    strokes: list[Trajectory | None] = []
+    ids, status = [], []
+    for row, name in enumerate(table.ids):
+        one = found.get(row)
+        if one is None or one.status != OK:
+            strokes.append(None)
+            ids.append(name)
+            status.append(table.status[row] if one is None else one.status)
+            continue
+        for key, stroke in zip(one.ids, one.strokes, strict=True):
+            t, normal = stroke.timing.t, stroke.normal
+            strokes.append(
+                Trajectory(
+                    t,
+                    stroke.position,
+                    None if stroke.euler is None else from_euler(stroke.euler),
+                    None if normal is None else np.broadcast_to(normal, (len(t), 3)),
+                )
+            )
+            ids.append(key)
+            status.append(OK)
+    return replace(_padded(strokes, ids, status), ready=ready)
+
+
+def _padded(strokes: list[Trajectory | None], ids: list[str], status: list[str]) -> TrajectoryBatch:
+    length = np.array([0 if one is None else len(one.t) for one in strokes], dtype=np.int64)
+    longest = int(length.max(initial=0))
+    t = next((one.t for one in strokes if one is not None and len(one.t) == longest), np.zeros(0))
+
+    def stacked(name: str, shape: tuple[int, ...]) -> Floats | None:
+        known = [None if one is None else getattr(one, name) for one in strokes]
+        if all(part is None for part in known):
+            return None
+        out = np.full((len(strokes), longest, *shape), np.nan)
+        for row, part in enumerate(known):
+            if part is not None:
+                out[row, : len(part)] = part
+        return out
+
+    position = stacked("position", (3,))
+    if position is None:
+        position = np.full((len(strokes), longest, 3), np.nan)
+    return TrajectoryBatch(
+        t, position, stacked("rotation", (3, 3)), stacked("normal", (3,)), status, length, ids
+    )
+
+
+def _columns(one: Trajectory) -> dict[str, Any]:
+    t, position = np.asarray(one.t, dtype=float), np.asarray(one.position, dtype=float)
+    if t.ndim != 1 or position.shape != (len(t), 3):
+        raise InputError(
+            f"t and position: shapes {t.shape} and {position.shape} are not (T,), (T, 3)"
+        )
+    columns: dict[str, Any] = {"t": t, **dict(zip(schemas.POSITION, position.T, strict=True))}
+    if one.rotation is not None:
+        R = np.asarray(one.rotation, dtype=float)
+        if R.shape != (len(t), 3, 3):
+            raise InputError(f"rotation: shape {R.shape} is not {(len(t), 3, 3)}")
+        angles = np.unwrap(to_euler(R), axis=0)
+        columns |= dict(zip(schemas.EULER_ANGLES, angles.T, strict=True))
+    return columns
+
+
+def record_of(one: Trajectory) -> Record:
+    """Return the record that a trajectory or run is written as."""
+    if isinstance(one, DrawnTrajectory | Run) and one.record is not None:
+        return one.record
+    columns = _columns(one)
+    columns["id"] = np.array(["1"] * len(columns["t"]), dtype=object)
+    if one.normal is not None:
+        rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
+        columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
+    return Record(schemas.TRAJECTORY, columns, Provenance("write"))
+
+
+def measured(one: Trajectory) -> Stroke:
+    """Return a stroke as reports measure it."""
+    if isinstance(one, Demonstration):
+        source = one.file()
+        found = recordings.read(source, one.layout)
+        return Recorded(found.stroke, "demonstration", source.name, source.sha256, None).stroke()
+    return strokes_of(record_of(one), "stroke")[0]
