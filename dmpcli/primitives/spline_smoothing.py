@@ -36,9 +36,10 @@ _CLIP = 3.0
 # Sliding means of the residual that noise must explain; probability that noise alone exceeds it.
 _WINDOWS = (1, 2, 8, 32, 128, 512)
 _CHANCE = 1e-3
-# Times that intervals are halved, and samples that the smallest holds.
+# Times that intervals are halved, and samples that the smallest holds, and the smallest at an end:
+# a spline that is told so little from one side swings beyond its last sample.
 _HALVINGS = 12
-_SMALLEST = 1.0
+_SMALLEST, _SMALLEST_AT_END = 1.0, 2.0
 # Part of the stroke's acceleration below which that of noise is not worth smoothing.
 _NEGLIGIBLE = 1e-3
 # Points of the shape-preserving curve for each sample.
@@ -79,6 +80,12 @@ class SmoothSpline:
     smoothed_noise: float
     removed: float
     rests: tuple[bool, bool]
+
+    @property
+    def finest(self) -> int:
+        """Intervals that there were, were all as short as the shortest."""
+        breaks = self.spline.t[DEGREE:-DEGREE]
+        return int(np.rint(np.ptp(breaks) / np.diff(breaks).min()))
 
     def __call__(self, t: Floats, derivative: int = 0) -> Floats:
         """Values or derivatives at times t (S,), s, shape (S, D)."""
@@ -262,7 +269,9 @@ def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design,
         marked = np.zeros(design.intervals + 2, dtype=bool)
         marked[at + 1] = True
         marked = marked[1:-1] | marked[:-2] | marked[2:]
-        marked &= np.diff(breaks) >= 2.0 * _SMALLEST * design.step
+        smallest = np.full(design.intervals, _SMALLEST)
+        smallest[[0, -1]] = _SMALLEST_AT_END
+        marked &= np.diff(breaks) >= 2.0 * smallest * design.step
         if not marked.any():
             break
         if 2 * (design.intervals + int(marked.sum())) >= design.count:
