@@ -68,7 +68,7 @@ def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
     rms = [np.sqrt(np.mean(tree.query(spline(dense))[0] ** 2)) for spline in found]
     assert max(rms) <= sigma
     ends = off[:, [0, -1]].ravel()
-    # Of 52 samples, 13 coefficients on two axes keep 0.7σ: the largest of 48 is twice that and more.
+    # Of 52 samples, 13 coefficients on two axes keep 0.7σ: the largest of 48 is thrice that.
     few = 1.1 if rate < 10.0 else 1.0
     assert np.quantile(off[:, 2:-2].max(axis=1), 0.9) <= 2.0 * few * sigma
     assert off.max() <= 4.0 * sigma
