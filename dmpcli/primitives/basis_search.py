@@ -98,6 +98,8 @@ class Weights:
         What was to be learned, and what the weights make of it, at even times.
     quality : Quality
         Of the one beside the other.
+    bulge : float
+        How far the path was moved to begin and to end as demonstrated, mm.
     """
 
     basis: Basis
@@ -108,6 +110,15 @@ class Weights:
     demonstrated: Floats
     reproduced: Floats
     quality: Quality
+    bulge: float
+
+    def lacks(self, tolerance: Tolerance) -> float:
+        """Return by how many tolerances the weights miss, the ends by whole ones; 1 is enough.
+
+        Where a recording changes its speed next to its end faster than N carries, the path bulges
+        beyond the end, which the points that are nearest to the recording do not see.
+        """
+        return max(self.quality.excess(tolerance), self.bulge / tolerance.length)
 
 
 @dataclass(frozen=True)
@@ -147,15 +158,16 @@ class Problem:
         k, d = float(spring.k[0]), float(spring.d[0])
         model = forced_model(count, k, d, spring.tau / duration, self.alpha_1, self.widths)
         regression = model.regression
-        start, goal = self.curve(np.array([0.0, duration]))
+        ends = np.array([0.0, duration])
+        start, goal = self.curve(ends)
+        V0, V_end = spring.tau * self.curve(ends, 1)
         x, velocity, acceleration = self.curve.limited(count, model.samples)
         forcing = target_forcing(spring, goal, x, velocity, acceleration)
-        V0, V_end = spring.tau * velocity[0], spring.tau * velocity[-1]
+        # What N carries of the recording begins at another velocity than the recording.
+        late = V0 - spring.tau * velocity[0]
         rest = start * model.a + goal * model.b + V0 * model.c
         demonstrated = self.curve.even(model.samples)
-        C = model.end_responses
-        moves = regression.least_change(method, C)
-        E = model.end
+        C, E = model.end_responses, model.end
         required = np.stack(
             [
                 (goal - start) * E[0, 0] - V0 * E[0, 1],
@@ -166,16 +178,22 @@ class Problem:
         rounds = (passes,) if passes else (1,) if method == "ridge" else range(1, PASSES + 1)
         for number in rounds:
             weights = regression.fit(method, forcing, number)
-            response = model.response(np.concatenate([weights, moves.T]))
-            forced, moved = response[:, :6], response[:, 6:]
-            alpha_f = _alpha_f(demonstrated - rest, forced, demonstrated)
+            forced = model.response(weights)
+            alpha_f = _alpha_f(demonstrated - rest + late * model.c, forced, demonstrated)
+            bulge = 0.0
             if count > 1:
+                move, moved = model.start_move
+                by = late / alpha_f
+                weights, forced = weights + np.outer(by, move), forced + np.outer(moved, by)
+                moves, changed = model.end_moves
                 m = end_conditions.corrections(weights, required / alpha_f[:, None], C, moves)
-                weights, forced = weights + m @ moves.T, forced + moved @ m.T
+                weights, forced = weights + m @ moves.T, forced + changed @ m.T
+                by_ends = late * (model.c + moved[:, None]) + alpha_f * (changed @ m.T)
+                bulge = float(np.linalg.norm(by_ends[:, :3], axis=1).max())
             reproduced = rest + alpha_f * forced
             quality = judged(demonstrated, reproduced, self.closed)
             yield Weights(
-                model.basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality
+                model.basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality, bulge
             )
 
 
@@ -221,17 +239,17 @@ def search(
     while True:
         here: Weights | None = None
         for found in problem.learn(number, method, passes):
-            if here is None or found.quality.excess(tolerance) < here.quality.excess(tolerance):
+            if here is None or found.lacks(tolerance) < here.lacks(tolerance):
                 here = found
-            if here.quality.excess(tolerance) <= 1.0:
+            if here.lacks(tolerance) <= 1.0:
                 return here
         assert here is not None
-        excess = here.quality.excess(tolerance)
-        if best is None or excess < best.quality.excess(tolerance):
+        lacks = here.lacks(tolerance)
+        if best is None or lacks < best.lacks(tolerance):
             best = here
         if count is not None or number >= most:
             return best
-        number = min(most, int(np.ceil(number * np.clip(1.1 * np.sqrt(excess), 1.15, 4.0))))
+        number = min(most, int(np.ceil(number * np.clip(1.1 * np.sqrt(lacks), 1.15, 4.0))))
 
 
 def _alpha_f(rest: Floats, forced: Floats, demonstrated: Floats) -> Floats:

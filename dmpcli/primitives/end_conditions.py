@@ -1,8 +1,10 @@
-"""Weights that end the stroke on its goal, at the demonstrated velocity.
+"""Weights that begin the stroke at its velocity, and end it on its goal at the demonstrated one.
 
 A regression of the forcing term knows nothing of where the stroke ends: small errors of f add up.
 But the state at the end is linear in the weights, so that the least change of them that ends the
-stroke right has a closed form: two conditions per axis.
+stroke right has a closed form: two conditions per axis. Least is what moves the path least, and is
+done by the functions next to the end: a change spread over all of them, least in the weights or in
+what the regression minimizes, moves the path tens of times as far.
 """
 
 import numpy as np
@@ -10,6 +12,11 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.primitives.dynamics import NODES, Spring, longest_step, quadrature, transition
 from dmpcli.primitives.phase import Basis, phase
+
+# Functions at either end that a change is made of; more of them move the path no less.
+CHANGED = 6
+# Part of the path's own squares that the squares of weights cost beside them.
+_RIDGE = 1e-8
 
 
 def end_responses(spring: Spring, basis: Basis, alpha_1: float, duration: float) -> Floats:
@@ -44,8 +51,8 @@ def end_responses(spring: Spring, basis: Basis, alpha_1: float, duration: float)
 def corrections(weights: Floats, required: Floats, responses: Floats, moves: Floats) -> Floats:
     """Multipliers of the least change of weights that makes the forced response end as required.
 
-    The weights that do are ``w + A Cᵀ (C A Cᵀ)⁻¹ (r - C w)``, A the inverse Hessian of what the
-    regression minimizes.
+    The weights that do are ``w + A Cᵀ (C A Cᵀ)⁻¹ (r - C w)``, A the inverse Hessian of what is to
+    be least: how far the path moves.
 
     Parameters
     ----------
@@ -56,7 +63,7 @@ def corrections(weights: Floats, required: Floats, responses: Floats, moves: Flo
     responses : array, shape (2, N)
         C, of `end_responses`.
     moves : array, shape (N, 2)
-        A Cᵀ, of `BandedRegression.least_change`.
+        A Cᵀ, of `end_moves`.
 
     Returns
     -------
@@ -71,3 +78,50 @@ def corrections(weights: Floats, required: Floats, responses: Floats, moves: Flo
         scale * np.linalg.solve(gram * np.outer(scale, scale), (scale * missing).T).T
     )
     return multipliers
+
+
+def end_moves(paths: Floats, responses: Floats) -> Floats:
+    """Columns ``A Cᵀ`` that weights move along to end as required and move the path least.
+
+    Parameters
+    ----------
+    paths : array, shape (S, M)
+        Response to each of the last M functions over even times: A = (PᵀP + μ)⁻¹ for their weights,
+        0 for those of all others.
+    responses : array, shape (2, N)
+        C, of `end_responses`.
+
+    Returns
+    -------
+    array, shape (N, 2)
+    """
+    moves = np.zeros(responses.shape[::-1])
+    moves[-paths.shape[1] :] = _least_squares(paths, responses[:, -paths.shape[1] :].T)
+    return moves
+
+
+def start_move(paths: Floats, c: Floats, count: int) -> Floats:
+    """Change of weights that takes back the response to V0 = 1, but for its velocity at the start.
+
+    Parameters
+    ----------
+    paths : array, shape (S, M)
+        Response to each of the first M functions over even times.
+    c : array, shape (S,)
+        That to V0, of `dynamics.homogeneous`.
+    count : int
+        N.
+
+    Returns
+    -------
+    array, shape (N,)
+    """
+    move = np.zeros(count)
+    move[: paths.shape[1]] = -_least_squares(paths, paths.T @ c)
+    return move
+
+
+def _least_squares(paths: Floats, right: Floats) -> Floats:
+    gram = paths.T @ paths
+    gram += _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(gram, right))

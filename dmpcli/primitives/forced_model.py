@@ -5,7 +5,7 @@ the regression and the roll-out need of them is worked out once for each N.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,36 @@ class ForcedModel:
     def samples(self) -> int:
         """S."""
         return len(self.a)
+
+    @cached_property
+    def end_moves(self) -> tuple[Floats, Floats]:
+        """Changes of weights that correct the end, of `end_conditions.end_moves`.
+
+        Returns
+        -------
+        moves : array, shape (N, 2)
+        response : array, shape (S, 2)
+            To them.
+        """
+        changed = min(end_conditions.CHANGED, len(self.basis))
+        paths = self.response(np.eye(len(self.basis))[-changed:])
+        moves = end_conditions.end_moves(paths, self.end_responses)
+        return moves, paths @ moves[-changed:]
+
+    @cached_property
+    def start_move(self) -> tuple[Floats, Floats]:
+        """Change of weights that makes up for another V0, of `end_conditions.start_move`.
+
+        Returns
+        -------
+        move : array, shape (N,)
+        response : array, shape (S,)
+            To it.
+        """
+        changed = min(end_conditions.CHANGED, len(self.basis))
+        paths = self.response(np.eye(changed, len(self.basis)))
+        move = end_conditions.start_move(paths, self.c[:, 0], len(self.basis))
+        return move, paths @ move[:changed]
 
     def response(self, weights: Floats) -> Floats:
         """Response to the forcing terms of weights (D, N) at the samples, shape (S, D)."""

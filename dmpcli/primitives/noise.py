@@ -5,7 +5,7 @@ It is blind to noise that was filtered, interpolated or quantised on its way: su
 recognised by a plateau that ends within the band, or by a lattice on which all samples lie.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,8 @@ Kind = Literal["white", "band", "quantised", "unknown"]
 # Mean of the lower three quarters of sums of squares of two standard normal numbers.
 _LOWER = 0.75
 _MEAN_OF_LOWER = 2.0 * (1.0 - 0.25 * (1.0 + np.log(4.0))) / 0.75
+# Times the mean square difference by chance from which on the axes' variances differ.
+_APART = 4.0
 # Fewer samples do not tell noise from stroke.
 FEWEST = 40
 # Noise below this part of the stroke's extent is rounding.
@@ -86,6 +88,12 @@ class Noise:
         """Root mean square of the axes' standard deviations."""
         return float(np.sqrt(np.mean(self.sigma**2)))
 
+    def along(self, directions: Floats) -> "Noise":
+        """Return the noise in coordinates along orthonormal directions, the columns of (D, M)."""
+        part = directions.T @ self.axes * self.sigma
+        variances, axes = np.linalg.eigh(part @ part.T)
+        return replace(self, axes=axes, sigma=np.sqrt(np.maximum(variances, 0.0)))
+
 
 def estimate(x: Floats, partial: bool = True) -> Noise:
     """Estimate the noise of even samples.
@@ -151,9 +159,21 @@ def _detrended(x: Floats) -> Floats:
 
 
 def _spread(coefficients: Floats) -> tuple[Floats, Floats]:
-    """Principal axes of zero-mean coefficients (M, D), and robust standard deviations on them."""
+    """Principal axes of zero-mean coefficients (M, D), and robust standard deviations on them.
+
+    Alike where so few coefficients do not tell them apart: of isotropic noise the variances on the
+    principal axes differ by (D - 1)(D + 2)/(D M) of their mean, root mean square.
+    """
+    count, dimensions = coefficients.shape
     _, axes = np.linalg.eigh(coefficients.T @ coefficients)
-    return axes, _along(coefficients @ axes)
+    sigma = _along(coefficients @ axes)
+    variances = sigma**2
+    mean = float(variances.mean())
+    apart = float(np.mean((variances - mean) ** 2))
+    by_chance = (dimensions - 1) * (dimensions + 2) / (dimensions * count)
+    if apart <= _APART * by_chance * mean**2:
+        sigma = np.full(dimensions, np.sqrt(mean))
+    return axes, sigma
 
 
 def _along(coefficients: Floats) -> Floats:

@@ -93,7 +93,8 @@ class Preprocessed:
     @property
     def intervals(self) -> int:
         """Pieces of the band that the stroke fills: its highest frequency is so many / (2 T)."""
-        return self.position.intervals or len(self.raw.t) - 1
+        # Where intervals were halved, at a corner, it fills more.
+        return self.position.finest if self.position.intervals else len(self.raw.t) - 1
 
     @property
     def smoothed_noise(self) -> float:

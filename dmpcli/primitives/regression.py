@@ -127,24 +127,6 @@ class BandedRegression:
             weights = weights + (self._weighted.gathered(rest) / self._local_cost).T
         return weights
 
-    def least_change(self, method: Method, constraint: Floats) -> Floats:
-        """Columns ``A Cᵀ`` that weights move along to meet linear constraints at the least cost.
-
-        Parameters
-        ----------
-        method : {'lwr', 'ridge'}
-            A is the inverse Hessian of what the method minimizes: LWR's own local costs
-            ``Σ psi_i s²``, or the normal equations of `ridge`.
-        constraint : array, shape (C, N)
-
-        Returns
-        -------
-        array, shape (N, C)
-        """
-        if method == "ridge":
-            return self._solve(np.ascontiguousarray(constraint.T))
-        return constraint.T / self._local_cost
-
     @cached_property
     def _normal(self) -> Floats:
         """The normal equations with their slight ridge, in LAPACK's band form."""

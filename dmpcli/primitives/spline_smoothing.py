@@ -13,8 +13,10 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.primitives import least_squares
+from dmpcli.primitives.flat_directions import moving_axes
 from dmpcli.primitives.least_squares import DEGREE, Design
 from dmpcli.primitives.noise import FEWEST, Noise
+from dmpcli.primitives.spline_ends import end, with_ends
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -27,27 +29,31 @@ _RISEN = 3
 # What a coefficient costs, in variances. Mallows' 2 is unbiased, but the least of many values is
 # not: now and then it is far too soft.
 _PENALTY = 3.0
+# Intervals up to which the ends are a part of the choice of K.
+_ENDS_MATTER = 40
+# Standard errors, ∝ 1/√n, by which the variance may have been estimated too low.
+_UNSURE = 4.0
 # Samples per interval that the search for K needs; more are averaged.
 _DENSE = 12
 # Part by which the median square of 1 sample may exceed the mean one of noise, ∝ 1/√n.
 _SIGNIFICANT = 1.0
 # Residuals count up to so many σ in the search: corners are for the halving.
 _CLIP = 3.0
-# Sliding means of the residual that noise must explain; probability that noise alone exceeds it.
+# Sliding means of the residual that noise must explain.
 _WINDOWS = (1, 2, 8, 32, 128, 512)
-_CHANCE = 1e-3
-# Times that intervals are halved, and samples that the smallest holds.
+# Part of the places found that may be noise (Y. Benjamini and Y. Hochberg, J. R. Statist. Soc. B
+# 57, 1995): so often are intervals halved of which none should be; and where some were.
+_FALSE_FIRST, _FALSE = 0.005, 0.1
+# Times that intervals are halved, and samples that the smallest holds, and the smallest at an end:
+# a spline that is told so little from one side swings beyond its last sample.
 _HALVINGS = 12
-_SMALLEST = 1.0
+_SMALLEST, _SMALLEST_AT_END = 1.0, 2.0
 # Part of the stroke's acceleration below which that of noise is not worth smoothing.
 _NEGLIGIBLE = 1e-3
 # Points of the shape-preserving curve for each sample.
 _SHAPED = 4
 # Noise below this part of the largest value is rounding.
 _ROUNDING = 1e-13
-# Conditions at an end, by the derivatives that vanish, and how far the samples may contradict them,
-# in variances per condition: at rest, or cubic.
-_ENDS = (((1, 2), 3.0), ((3, 4, 5), 2.0), ((4, 5), 2.0), ((5,), 2.0))
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,12 @@ class SmoothSpline:
     smoothed_noise: float
     removed: float
     rests: tuple[bool, bool]
+
+    @property
+    def finest(self) -> int:
+        """Intervals that there were, were all as short as the shortest."""
+        breaks = self.spline.t[DEGREE:-DEGREE]
+        return int(np.rint(np.ptp(breaks) / np.diff(breaks).min()))
 
     def __call__(self, t: Floats, derivative: int = 0) -> Floats:
         """Values or derivatives at times t (S,), s, shape (S, D)."""
@@ -116,24 +128,30 @@ def smooth(
         cut-off from fewer than `FEWEST` samples, which do not tell noise from stroke.
     """
     count = len(x)
+    if cutoff is None and _too_little(x, noise):
+        return _interpolating(x, duration, noise, resampled)
     # About its mean, so that a stroke far from the origin loses no digits.
     middle = x.mean(axis=0)
     centred = x - middle
+    axes = np.eye(x.shape[1]) if cutoff is not None else moving_axes(centred, noise)
+    moving, inside = centred @ axes, noise.along(axes)
+    variance = _variance(moving, inside)
     if cutoff is not None:
         K: int | None = max(1, round(2.0 * duration * cutoff))
     else:
-        K = None if _too_little(centred, noise) else _intervals(centred, _variance(centred, noise))
+        K = _intervals(moving, variance)
     if K is None or _too_many(K, count):
         return _interpolating(x, duration, noise, resampled)
     design = least_squares.uniform(count, K)
-    c = design.coefficients(centred)
+    c = design.coefficients(moving)
     rests = (False, False)
     if cutoff is None:
-        halved = _halved(design, c, centred, noise)
+        halved = _halved(design, c, moving, inside)
         if halved is None:
             return _interpolating(x, duration, noise, resampled)
         design, c = halved
-        c, rests = _with_ends(design, c, _variance(centred, noise))
+        c, rests = with_ends(design, c, variance)
+    c = c @ axes.T
     residual = centred - design.values(c)
     from scipy.interpolate import BSpline
 
@@ -142,7 +160,7 @@ def smooth(
         K,
         K / (2.0 * duration),
         noise,
-        noise.typical * float(np.sqrt(design.intervals / count)),
+        float(np.sqrt(inside.total / x.shape[1] * design.intervals / count)),
         float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))),
         rests,
     )
@@ -215,8 +233,7 @@ def _best(x: Floats, variance: float, about: int) -> int | None:
             coarse = _averaged(x, _DENSE * highest)
             share = variance * len(coarse) / count
             continue
-        left = np.minimum(_squares(coarse, count, K), _CLIP**2 * share)
-        criterion = float(np.sum(left)) + _PENALTY * share * (K + DEGREE)
+        criterion = _criterion(coarse, count, K, share)
         if criterion < least:
             best, least, at = K, criterion, rung
         elif rung - at >= _RISEN:
@@ -242,18 +259,38 @@ def _averaged(x: Floats, enough: int) -> Floats:
     return x[: blocks * each].reshape(blocks, each, -1).mean(axis=1) if each > 1 else x
 
 
+def _criterion(coarse: Floats, count: int, K: int, share: float) -> float:
+    """Mallows' Cp of K intervals, with conditions at the ends where these are a part of it all."""
+    design = _design(coarse, count, K)
+    c = design.solve(design.right(coarse))
+    residual = coarse - design.values(c)
+    left = np.einsum("td,td->t", residual, residual)
+    criterion = float(np.sum(np.minimum(left, _CLIP**2 * share)))
+    coefficients = float(design.size)
+    if K <= _ENDS_MATTER:
+        for reverse in (False, True):
+            found = end(design, c, share, reverse)
+            criterion += found.cost
+            coefficients -= found.conditions
+    penalty = _PENALTY * (1.0 + _UNSURE / float(np.sqrt(count)))
+    return criterion + penalty * share * coefficients
+
+
 def _squares(coarse: Floats, count: int, K: int) -> Floats:
     """Squared distances that the best spline on K intervals leaves of means of samples."""
-    each, unit = count // len(coarse), K / (count - 1)
-    design = least_squares.uniform(len(coarse), K, 0.5 * (each - 1) * unit, each * unit)
-    residual = design.residual(coarse)
+    residual = _design(coarse, count, K).residual(coarse)
     return np.asarray(np.einsum("td,td->t", residual, residual))
+
+
+def _design(coarse: Floats, count: int, K: int) -> Design:
+    each, unit = count // len(coarse), K / (count - 1)
+    return least_squares.uniform(len(coarse), K, 0.5 * (each - 1) * unit, each * unit)
 
 
 def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design, Floats] | None:
     """Halve intervals where noise does not explain the residual; None where that is everywhere."""
-    for _ in range(_HALVINGS):
-        doubted = _doubted(x - design.values(c), design, noise, x)
+    for i in range(_HALVINGS):
+        doubted = _doubted(x - design.values(c), design, noise, x, i == 0)
         if not doubted.any():
             break
         breaks = design.breaks
@@ -262,7 +299,9 @@ def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design,
         marked = np.zeros(design.intervals + 2, dtype=bool)
         marked[at + 1] = True
         marked = marked[1:-1] | marked[:-2] | marked[2:]
-        marked &= np.diff(breaks) >= 2.0 * _SMALLEST * design.step
+        smallest = np.full(design.intervals, _SMALLEST)
+        smallest[[0, -1]] = _SMALLEST_AT_END
+        marked &= np.diff(breaks) >= 2.0 * smallest * design.step
         if not marked.any():
             break
         if 2 * (design.intervals + int(marked.sum())) >= design.count:
@@ -274,84 +313,31 @@ def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design,
     return design, c
 
 
-def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats) -> Booleans:
-    """Samples in the middle of a sliding mean that noise does not explain, shape (n,)."""
-    from scipy.special import chdtri
+def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats, first: bool) -> Booleans:
+    """Samples in the middle of a sliding mean, or on a peak, that noise does not explain, (n,)."""
+    from scipy.special import chdtrc, chdtri
 
-    count = len(residual)
+    count, dimensions = residual.shape
     sigma = max(noise.largest, _ROUNDING * float(np.max(np.abs(x))))
-    limit = float(np.sqrt(chdtri(x.shape[1], _CHANCE / (count * len(_WINDOWS)))))
     # Rounding to a lattice may hold on for as long as the tool is slow.
-    lattice = 0.0 if noise.step is None else 0.5 * noise.step * np.sqrt(x.shape[1])
-    sums = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(residual, axis=0)])
-    doubted = np.zeros(count, dtype=bool)
-    for window in _WINDOWS:
-        if window > _WINDOWS[3] and window > count / (2 * design.intervals):
-            break
-        if window > count:
+    lattice = 0.0 if noise.step is None else 0.5 * noise.step * np.sqrt(dimensions)
+    sums = np.concatenate([np.zeros((1, dimensions)), np.cumsum(residual, axis=0)])
+    squares = np.zeros((len(_WINDOWS) + 1, count))
+    for row, window in zip(squares, _WINDOWS, strict=False):
+        if window > count or (window > _WINDOWS[3] and window > count / (2 * design.intervals)):
             break
         means = (sums[window:] - sums[:-window]) / window
-        far = limit * sigma / np.sqrt(window) + lattice
-        wrong = np.einsum("td,td->t", means, means) > far * far
-        doubted[window // 2 : window // 2 + len(wrong)] |= wrong
-    return doubted
-
-
-def _with_ends(design: Design, c: Floats, variance: float) -> tuple[Floats, tuple[bool, bool]]:
-    """Let derivatives vanish at the ends where the samples do not contradict it.
-
-    Free ends are the noisiest part of a fit. Conditions A c = 0 cost (Ac)ᵀ(A G⁻¹ Aᵀ)⁻¹(Ac) of
-    squares and save as many coefficients: the choice is Mallows' again.
-    """
-    chosen = [_end_condition(design, c, variance, reverse) for reverse in (False, True)]
-    A = np.concatenate([rows for rows, _ in chosen])
-    if len(A) > 0:
-        back = design.solve(np.ascontiguousarray(A.T))
-        c = c - back @ np.linalg.solve(A @ back, A @ c)
-    rests = chosen[0][1], chosen[1][1]
-    # To the last digit, so that the drawn velocity is zero.
-    if rests[0]:
-        c[1:3] = c[0]
-    if rests[1]:
-        c[-3:-1] = c[-1]
-    return c, rests
-
-
-def _end_condition(
-    design: Design, c: Floats, variance: float, reverse: bool
-) -> tuple[Floats, bool]:
-    """Rows A (m, K + 5) of the best condition at an end, none if free; and whether it rests."""
-    derivatives = _derivatives(-design.knots[::-1] if reverse else design.knots)
-    best, least, rests = np.zeros((0, len(c))), 0.0, False
-    for orders, doubt in _ENDS:
-        # Few coefficients: what is asked of the inner ones would meet the other end's.
-        if max(orders) > 2 and len(c) < 2 * (DEGREE + 1):
-            continue
-        A = np.zeros((len(orders), len(c)))
-        A[:, : DEGREE + 1] = derivatives[list(orders)]
-        A = A[:, ::-1] if reverse else A
-        value = A @ c
-        back = design.solve(np.ascontiguousarray(A.T))
-        cost = float(np.sum(value * np.linalg.solve(A @ back, value)))
-        criterion = cost - doubt * len(orders) * variance
-        if criterion < least:
-            best, least, rests = A, criterion, orders == (1, 2)
-            if rests:
-                break
-    return best, rests
-
-
-def _derivatives(knots: Floats) -> Floats:
-    """Derivatives 0 … 5 at the first knot, by the first six coefficients, shape (6, 6).
-
-    Scaled so that each row's largest entry is 1.
-    """
-    rows = np.zeros((DEGREE + 1, DEGREE + 1))
-    level = np.eye(DEGREE + 1)
-    rows[0] = level[0]
-    for order in range(1, DEGREE + 1):
-        degree = DEGREE - order + 1
-        spans = knots[order + degree : order + degree + len(level) - 1] - knots[DEGREE]
-        level = np.diff(level, axis=0) / spans[:, None]
-        rows[order] = level[0] / np.max(np.abs(level[0]))
-    return rows
+        far = np.sqrt(np.einsum("td,td->t", means, means)) - lattice
+        row[window // 2 : window // 2 + len(far)] = window * np.maximum(far / sigma, 0.0) ** 2
+    if noise.step is None:
+        # At a corner the residual swings to and fro.
+        peaks = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
+        squares[-1, 1:-1] = np.einsum("td,td->t", peaks, peaks) / (1.5 * sigma**2)
+    # Of the places found so many may be none; where one corner is found there are more.
+    share = _FALSE_FIRST if first else _FALSE
+    candidates = np.sort(squares[squares > chdtri(dimensions, share)])[::-1]
+    false = chdtrc(dimensions, candidates) * squares.size / np.arange(1, len(candidates) + 1)
+    found = np.flatnonzero(false <= share)
+    if len(found) == 0:
+        return np.zeros(count, dtype=bool)
+    return np.asarray(np.any(squares >= candidates[found[-1]], axis=0))
