@@ -26,8 +26,10 @@ ifneq ($(words $(VENV) $(OUT)),2)
 $(error VENV and OUT may not have spaces in their names: make cannot tell them from two)
 endif
 
-# A shell that was set up for something else (ROS, for one) would mix its packages into ours.
-unexport PYTHONPATH PYTHONHOME
+# A shell that was set up for something else (ROS, for one) would mix its packages into ours. An
+# environment is made without byte code, which is kept as modules are used: without it, every process
+# and every run of the tests would compile numpy, scipy and the tests anew.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 export RUFF_CACHE_DIR := $(CACHE)/ruff
 export MYPY_CACHE_DIR := $(CACHE)/mypy
 
@@ -45,9 +47,10 @@ help:
 $(VENV)/installed: FORCE
 	@sh tools/set_up.sh "$(PYTHON)" "$(VENV)" "$(LOCK)" "$(OUT)"
 
-# Tests. The quick half leaves out what is marked slow.
+# Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
+# what they share is made once.
 
-PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses auto --dist worksteal
+PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/installed lint
 	$(PYTEST)

@@ -9,5 +9,13 @@ from hypothesis import settings
 settings.register_profile("dmpcli", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("dmpcli")
 
+FIRST = ("tests/pipeline", "tests/tools")
+"""These wait more than they work: begun last, they would leave the other cores idle at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
+
+
 # Typer's runner builds all commands anew for each call, which takes longer than most calls do.
 typer.testing._get_command = functools.cache(typer.testing._get_command)

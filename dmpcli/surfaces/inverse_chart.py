@@ -8,7 +8,6 @@ field the closest point of the mesh lies up to 0.16 mm beside the foot.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.plane import PlaneCharts
@@ -278,6 +277,8 @@ def _beside(charts: Charts, position: Floats, nodes: Floats) -> tuple[Floats, Fl
 
     Of nodes as near as each other the one least beside the line from start to goal.
     """
+    from scipy.spatial import cKDTree
+
     lift = charts.lift(nodes)
     excess = np.abs(nodes[..., 1]) + np.maximum(
         np.maximum(-nodes[..., 0], nodes[..., 0] - charts.lengths[:, None]), 0.0

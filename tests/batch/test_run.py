@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from dmpcli import cli
 from dmpcli.primitives.choices import Choices
 from dmpcli.primitives.learning import fit
 from dmpcli.records import manifest, record, skill, streams
@@ -42,13 +44,10 @@ def write_pairs(path, count, bad=()):
 
 
 def run(learned, folder, table, *options, code=0):
-    command = [DMPCLI, "generalize", str(learned), "-o", str(folder), "--pairs", str(table)]
-    done = subprocess.run(
-        [*command, "--rate", "20", "--pairs-per-part", "50", *map(str, options)],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == code, done.stderr
+    words = ["generalize", str(learned), "-o", str(folder), "--pairs", str(table)]
+    words += ["--rate", "20", "--pairs-per-part", "50", *map(str, options)]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stderr
 
@@ -238,9 +237,9 @@ def test_wrong_options_are_refused_before_the_folder_is_touched(
 
 @pytest.mark.slow
 def test_options_of_batches_belong_to_pairs(learned, tmp_path):
-    command = [DMPCLI, "generalize", learned, "-o", tmp_path / "t.parquet", "--reproduce"]
-    done = subprocess.run([*map(str, command), "--jobs", "2"], capture_output=True, text=True)
-    assert done.returncode == 2
+    words = ["generalize", str(learned), "-o", str(tmp_path / "t.parquet"), "--reproduce"]
+    done = CliRunner().invoke(cli.app, [*words, "--jobs", "2"])
+    assert done.exit_code == 2
     assert "--jobs: belongs to --pairs" in done.stderr
 
 

@@ -7,12 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner, Result
 
+from dmpcli import cli
 from dmpcli.control.workcell import parse
-from tests.commands.virtual_lab import FREE_PORTS, Lab, run
+from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.simulation.elite_server.virtual_fakes import Client
 
 START = (-551.030, 131.399, -17.560)
+
+
+def refused(*words: str) -> Result:
+    """Run the command, which must not come to serve, in this process."""
+    return CliRunner().invoke(cli.app, words)
 
 
 def rpc_port(lab: Lab) -> int:
@@ -149,8 +156,8 @@ def test_a_mistake_on_the_command_line_is_one_message(options, words, tmp_path, 
     frame = {"position": [0, 0, 100]}
     tool = {"schema": "tool", "version": 2, "flange_to_tcp": frame, "flange_to_sensor": frame}
     (tmp_path / "geometry.json").write_text(json.dumps(tool))
-    done = run("simulate", *FREE_PORTS, *options)
-    assert done.returncode == 2
+    done = refused("simulate", *FREE_PORTS, *options)
+    assert done.exit_code == 2
     assert done.stdout == ""
     assert words in done.stderr
     assert done.stderr.count("\n") == 1
@@ -158,16 +165,18 @@ def test_a_mistake_on_the_command_line_is_one_message(options, words, tmp_path, 
 
 @pytest.mark.slow
 def test_a_start_out_of_reach_is_refused():
-    done = run("simulate", *FREE_PORTS, "--start", "-2000", "0", "0", "--goal", "-2100", "0", "0")
-    assert done.returncode == 3
+    done = refused(
+        "simulate", *FREE_PORTS, "--start", "-2000", "0", "0", "--goal", "-2100", "0", "0"
+    )
+    assert done.exit_code == 3
     assert "out of reach" in done.stderr
 
 
 @pytest.mark.slow
 def test_a_host_that_is_not_this_computers_is_refused():
     for host in ("300.1.1.1", "192.0.2.1", "a..b"):
-        done = run("simulate", *FREE_PORTS, "--host", host)
-        assert done.returncode == 2
+        done = refused("simulate", *FREE_PORTS, "--host", host)
+        assert done.exit_code == 2
         assert f"--host {host}: is no address of this computer" in done.stderr
         assert done.stderr.count("\n") == 1
 
@@ -177,8 +186,8 @@ def test_a_host_that_is_not_this_computers_is_refused():
 def test_a_port_that_is_taken_is_refused(name):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        done = run("simulate", *FREE_PORTS, f"--{name}-port", port)
-    assert done.returncode == 4
+        done = refused("simulate", *FREE_PORTS, f"--{name}-port", port)
+    assert done.exit_code == 4
     assert done.stdout == ""
     assert f"--{name}-port {port} on 127.0.0.1: Address already in use; 0 takes" in done.stderr
     assert done.stderr.count("-port") == 1
@@ -190,6 +199,6 @@ def test_a_sensor_port_that_is_taken_is_refused():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = str(taken.getsockname()[1])
-        done = run("simulate", *FREE_PORTS, "--sensor-port", port)
-    assert done.returncode == 4
+        done = refused("simulate", *FREE_PORTS, "--sensor-port", port)
+    assert done.exit_code == 4
     assert f"--sensor-port {port}" in done.stderr

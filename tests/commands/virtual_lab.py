@@ -64,8 +64,3 @@ class Lab:
             self._process.send_signal(number)
         self.rest, self.told = self._process.communicate(timeout=60.0)
         self.code = self._process.returncode
-
-
-def run(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run the installed command to its end."""
-    return subprocess.run([DMPCLI, *words], capture_output=True, text=True, timeout=120)

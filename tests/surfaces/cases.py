@@ -1,6 +1,7 @@
 """Strokes on surfaces with a known truth: pairs, meshes and the true curves."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -29,6 +30,7 @@ class Case:
     axes: np.ndarray
 
 
+@cache
 def mesh(name, faces):
     """Return a mesh of the surface with about so many faces, large enough for the strokes."""
     n = round(np.sqrt(faces / 2)) + 1
@@ -59,6 +61,7 @@ def largest_error(name, mesh):
     return max(distance(name, middles).max(), distance(name, mesh.corners.mean(axis=1)).max())
 
 
+@cache
 def case(name, headings=32, samples=500, periods=2):
     """Strokes about the middle of the surface in so many headings."""
     heading = np.linspace(0, 2 * np.pi, headings, endpoint=False) + 0.1

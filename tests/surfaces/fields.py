@@ -26,10 +26,11 @@ class Field:
         n = np.stack([-gx, -gy, np.ones_like(gx)], axis=-1)
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
-    def walk(self, xy, direction, length, steps=160):
+    def walk(self, xy, direction, length, steps=80):
         """End point and direction in space of geodesics, by Runge and Kutta's fourth-order steps.
 
-        x'' = -f_x q / (1 + f_x² + f_y²), q the second derivative of f along the way.
+        x'' = -f_x q / (1 + f_x² + f_y²), q the second derivative of f along the way. With 80 steps
+        a strip's points are right to 6e-6 mm, seen beside 640.
         """
 
         def motion(z):
@@ -57,7 +58,7 @@ class Field:
         t = np.stack([c, s, gx * c + gy * s], axis=-1)
         return t / np.linalg.norm(t, axis=-1, keepdims=True)
 
-    def strip(self, xy, direction, coordinates, steps=160):
+    def strip(self, xy, direction, coordinates, steps=80):
         """Points, e_v and normals (B, T, 3) of chart coordinates (B, T, 3) off given geodesics."""
         T = coordinates.shape[1]
         start = np.repeat(xy[:, None], T, axis=1)
@@ -91,19 +92,20 @@ def bumpy():
     """Return z = a Σ sin(k_i · (x, y) + i), see `WAVES` and `AMPLITUDE`."""
     K = WAVES[:, :2] * WAVES[:, 2:]
 
-    def angles(x, y):
-        return [(k, k[0] * x + k[1] * y + i) for i, k in enumerate(K)]
+    def waves(of, x, y):
+        return [AMPLITUDE * of(k[0] * x + k[1] * y + i) for i, k in enumerate(K)]
 
-    return Field(
-        lambda x, y: AMPLITUDE * sum(np.sin(a) for _, a in angles(x, y)),
-        lambda x, y: tuple(
-            AMPLITUDE * sum(k[c] * np.cos(a) for k, a in angles(x, y)) for c in (0, 1)
-        ),
-        lambda x, y: tuple(
-            -AMPLITUDE * sum(k[c] * k[d] * np.sin(a) for k, a in angles(x, y))
-            for c, d in ((0, 0), (0, 1), (1, 1))
-        ),
-    )
+    def gradient(x, y):
+        a, b = waves(np.cos, x, y)
+        return tuple(K[0, c] * a + K[1, c] * b for c in (0, 1))
+
+    def hessian(x, y):
+        a, b = waves(np.sin, x, y)
+        return tuple(
+            -K[0, c] * K[0, d] * a - K[1, c] * K[1, d] * b for c, d in ((0, 0), (0, 1), (1, 1))
+        )
+
+    return Field(lambda x, y: sum(waves(np.sin, x, y)), gradient, hessian)
 
 
 def smallest_radius(field, reach=100.0):

@@ -3,6 +3,7 @@
 With an empty lock file and without the project, so that no package index is asked.
 """
 
+import importlib.util
 import json
 import os
 import signal
@@ -55,6 +56,13 @@ class Place:
         assert not self.stamp.exists()
         return line
 
+    def python_without(self, module):
+        """Return the environment variable that takes a module from Python."""
+        site = self.folder / "site"
+        site.mkdir()
+        (site / "sitecustomize.py").write_text(f"import sys\nsys.modules[{module!r}] = None\n")
+        return {"PYTHONPATH": str(site)}
+
     def script(self, text):
         """Let PYTHON be a program of our own."""
         file = self.folder / "python"
@@ -66,6 +74,32 @@ class Place:
 @pytest.fixture
 def place(tmp_path):
     return Place(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A place with an environment: each takes seconds to make."""
+    place = Place(tmp_path_factory.mktemp("whole"))
+    assert "into .venv" in place.done()
+    return place
+
+
+@pytest.fixture
+def pip(whole, monkeypatch):
+    """What `set_up` does to install into an environment; returns what it ends with."""
+    monkeypatch.chdir(whole.folder)
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    spec = importlib.util.spec_from_file_location("set_up", TOOLS / "set_up.py")
+    set_up = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(set_up)
+
+    def refused(*words):
+        with pytest.raises(set_up.SetUpError) as caught:
+            set_up.pip(whole.venv, *words, "--no-deps", "--only-binary", ":all:")
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    return refused
 
 
 @pytest.mark.slow
@@ -85,10 +119,7 @@ def test_a_python_too_old_or_of_another_make_is_one_line(place, told):
 
 @pytest.mark.parametrize("module", ["venv", "ensurepip"])
 def test_a_python_without_venv_is_one_line_with_debians_package(place, module):
-    site = place.folder / "site"
-    site.mkdir()
-    (site / "sitecustomize.py").write_text(f"import sys\nsys.modules[{module!r}] = None\n")
-    said = place.refused(PYTHONPATH=str(site))
+    said = place.refused(**place.python_without(module))
     package = f"python{sys.version_info.major}.{sys.version_info.minor}-venv"
     assert f"without its module {module}: on Debian and Ubuntu sudo apt install {package}" in said
 
@@ -107,35 +138,38 @@ def test_a_folder_that_holds_something_else_is_not_emptied(place):
 
 
 @pytest.mark.slow
-def test_no_index_is_one_line(place):
-    place.lock.write_text("six==1.16.0\n")
-    said = place.refused(PIP_INDEX_URL="http://127.0.0.1:9/simple", PIP_FIND_LINKS="")
+def test_no_index_is_one_line(pip, monkeypatch):
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
+    monkeypatch.setenv("PIP_FIND_LINKS", "")
+    said = pip("six==1.16.0")
     assert "no package index is reached: check network and proxy" in said
     assert "PIP_INDEX_URL=URL" in said
 
 
 @pytest.mark.slow
-def test_a_package_without_a_wheel_is_named_with_the_python(place):
-    place.lock.write_text("ur-rtde==1.6.5\n")
-    (place.folder / "links").mkdir()
-    said = place.refused(PIP_NO_INDEX="1", PIP_FIND_LINKS="links")
+def test_a_package_without_a_wheel_is_named_with_the_python(pip, tmp_path, monkeypatch):
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path))
+    said = pip("ur-rtde==1.6.5")
     assert "no wheel of ur-rtde==1.6.5 for CPython" in said
 
 
 @pytest.mark.slow
-def test_it_is_made_once_and_anew_when_lock_or_python_changes(place):
-    assert "into .venv" in place.done()
-    assert place.done() == ""
-    made = json.loads(place.stamp.read_text())
-    place.stamp.write_text(json.dumps(made | {"python": "3.11.0 elsewhere"}))
-    (place.venv / "left-over").touch()
-    assert "into .venv" in place.done()
-    assert not (place.venv / "left-over").exists()
+def test_it_is_made_once_and_anew_when_lock_or_python_changes(whole):
+    assert whole.done() == ""
     # An activated environment's Python is the environment's own: it must outlive its folder.
-    place.python = str(place.venv / "bin/python")
-    assert place.done() == ""
-    place.lock.write_text("# another\n")
-    assert "into .venv" in place.done()
+    given, whole.python = whole.python, str(whole.venv / "bin/python")
+    assert whole.done() == ""
+    whole.lock.write_text("# another\n")
+    (whole.venv / "left-over").touch()
+    assert "into .venv" in whole.done()
+    assert not (whole.venv / "left-over").exists()
+    whole.python = given
+    assert whole.done() == ""
+    made = json.loads(whole.stamp.read_text())
+    whole.stamp.write_text(json.dumps(made | {"python": "3.11.0 elsewhere"}))
+    # What stops it shows as well that it sets out to make it anew, and sooner.
+    assert "without its module venv" in whole.refused(**whole.python_without("venv"))
 
 
 @pytest.mark.slow

@@ -73,9 +73,7 @@ def test_a_trajectory_has_the_bytes_that_generalize_writes(tmp_path, skill, surf
         words = ["--surface", surface]
     dmpcli.write(skill, tmp_path / "s.json")
     words += ["--start", *ends[0], "--goal", *ends[1], "--orientation", "surface"]
-    done = command(
-        "generalize", tmp_path / "s.json", "-o", tmp_path / "a.parquet", *words
-    )
+    done = command("generalize", tmp_path / "s.json", "-o", tmp_path / "a.parquet", *words)
     assert done.exit_code == 0, done.stderr
     one = dmpcli.generalize(skill, *ends, surface=on, orientation="surface")
     dmpcli.write(one, tmp_path / "b.parquet")
