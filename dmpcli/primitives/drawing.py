@@ -2,17 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.primitives import own_timing
+from dmpcli.primitives.choices import Amplitude, OnBorder, Orientation
 from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.primitives.generalization import (
-    Amplitude,
-    Orientation,
     Pairs,
     Trajectories,
     curves,
@@ -26,8 +24,6 @@ from dmpcli.primitives.tool_speed import Pace
 from dmpcli.surfaces.keep_off import KeepOff
 from dmpcli.surfaces.plane import Plane, pair_charts
 from dmpcli.surfaces.protocol import Charts, Status, Surface
-
-OnBorder = Literal["fail", "clip", "skip", "split"]
 
 
 @dataclass(frozen=True)
