@@ -9,7 +9,6 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
-from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.errors import RefusedError
 from dmpcli.instruments import guards
 from dmpcli.instruments.interruption import Interruption
@@ -18,9 +17,11 @@ from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives.identification import check_orientations
 from dmpcli.primitives.reach import Reach
 from dmpcli.records.static_poses import StaticPose
+from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.streaming import plan as planning
 from dmpcli.streaming import preflight
 from dmpcli.streaming.contact import Touch
+from dmpcli.streaming.limits import Limits
 from dmpcli.streaming.loop import Arm, Loop, Watch
 from dmpcli.streaming.plan import Plan, Stroke
 
@@ -137,8 +138,8 @@ class Tour:
     def _way(self, start: Pose, goal: Pose) -> Plan:
         """Straight to a pose, and one period there."""
         s = self._settings
-        speed = s.limits.speed
-        return planning.make(self._there(goal), s.period, 1.0, s.limits, start, speed)
+        speed = _limits(s).speed
+        return planning.make(self._there(goal), s.period, 1.0, _limits(s), start, speed)
 
     def _go(self, goal: Pose, where: str) -> None:
         self._stop_if_asked()
@@ -151,7 +152,7 @@ class Tour:
         )
         loop = Loop(
             self._way((state.position, state.rotation), goal),
-            s.limits,
+            _limits(s),
             watch,
             self._arm,
             Touch(self._sensing, self._change),
@@ -186,3 +187,16 @@ class Tour:
         number = self._interruption.number
         if number is not None:
             raise Interrupted(number, f"{signal.Signals(number).name}: stopped between two poses")
+
+
+def _limits(settings: CalibrateSettings) -> Limits:
+    """Limits of the set-points; the TCP stays where it is but for what the arm strayed."""
+    return Limits(
+        20.0,
+        200.0,
+        5000.0,
+        settings.max_rotation_speed,
+        settings.max_rotation_acceleration,
+        settings.max_rotation_jerk,
+        settings.workspace,
+    )

@@ -10,46 +10,20 @@ from dmpcli.errors import InputError, counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dmpcli.primitives.drawing import OnBorder, Stroke, Style
+    from dmpcli.primitives.choices import OnBorder
+    from dmpcli.primitives.drawing import Stroke, Style
     from dmpcli.primitives.skill import Skill
-    from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
+    from dmpcli.settings.generalize import GeneralizeSettings
+    from dmpcli.settings.options import Given
     from dmpcli.surfaces.border_margin import BorderMargin
     from dmpcli.surfaces.keep_off import Region
     from dmpcli.surfaces.protocol import Surface
 
-Lead = Annotated[
-    float | None,
-    typer.Option(metavar="DEG", help="Lean the tool off the normal, forward along its travel."),
-]
-Tilt = Annotated[
-    float | None,
-    typer.Option(metavar="DEG", help="Lean the tool off the normal, across the stroke: to +v."),
-]
-Margin = Annotated[
-    float | None,
-    typer.Option(metavar="MM", help="How far off a mesh's border a stroke must stay, along it."),
-]
 KeepOut = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Closed lines that no stroke enters: x y z [id], mm."),
 ]
-Copies = Annotated[
-    int | None, typer.Option(metavar="N", help="Draw each stroke N times, side by side.")
-]
-Spacing = Annotated[
-    float | None,
-    typer.Option(metavar="MM", help="Of copies, along v; negative to the other side."),
-]
-ToolSpeed = Annotated[
-    float | None,
-    typer.Option(metavar="MM_S", help="Constant along the path, but for ends and corners."),
-]
-ToolAcceleration = Annotated[
-    float | None,
-    typer.Option(metavar="MM_S2", help="At the ends and in corners at most (1000)."),
-]
-
 _REST = "bends and ends ask for less: lower --tool-speed, or raise --tool-acceleration"
 SLOW = f"hold --tool-speed on less than half of their paths; {_REST}"
 SPLIT = "split at the border; pieces shorter than 5 mm are left out"
@@ -58,28 +32,9 @@ _OFF = 1.0
 """How far the points of a line may lie off the surface, mm, unless --snap-tol says more."""
 
 
-def leaving(on_border: str) -> "OnBorder":
-    """Return what becomes of a stroke that leaves the surface.
-
-    Raises
-    ------
-    InputError
-        There is no such choice.
-    """
-    from typing import get_args
-
-    from dmpcli.primitives.drawing import OnBorder
-
-    for choice in get_args(OnBorder):
-        if on_border == choice:
-            found: OnBorder = choice
-            return found
-    raise InputError(f"--on-border {on_border}: must be fail, clip, skip or split")
-
-
 def check(
     settings: "GeneralizeSettings",
-    orientation: str | None,
+    given: "Given",
     surface: Path | None,
     keep_out: Path | None,
 ) -> None:
@@ -88,8 +43,8 @@ def check(
     Parameters
     ----------
     settings : GeneralizeSettings
-    orientation : str or None
-        As the command line gives it.
+    given : dict
+        What the command line itself says of them.
     surface, keep_out : Path or None
 
     Raises
@@ -97,7 +52,7 @@ def check(
     InputError
         Names the options.
     """
-    if settings.inclination is not None and orientation == "keep":
+    if settings.inclination is not None and given.get("orientation") == "keep":
         raise InputError(
             "--lead and --tilt lean the tool off the surface's normal, with which --orientation "
             "keep does not turn it; leave it out"

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmpcli.drag.log import Log
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import guards
 from dmpcli.instruments.guards import Trail
@@ -35,6 +34,7 @@ from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives.admittance import Pose, brake, move
 from dmpcli.primitives.compensation import Compensation, LowPass, dead_band
 from dmpcli.primitives.wrench import Tool
+from dmpcli.settings.record import RecordSettings
 
 STILL = 0.5
 """mm: a tool that stays within this of one point is at rest."""

@@ -7,10 +7,10 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.drag.references import DURATION, Reference
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.drag.tutor import HandParameters, Tutor, stroke_time
 from dmpcli.errors import InputError
 from dmpcli.instruments.mock import Lab, Plate, Scene
+from dmpcli.settings.record import RecordSettings
 
 DELAY = 0.05
 """Of the mock's arm: one servo period and its lag, s."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.drag.references import Reference
-from dmpcli.drag.settings import RecordSettings
+from dmpcli.settings.record import RecordSettings
 
 _TABLE_RATE = 200.0
 _HOLD = 3.0

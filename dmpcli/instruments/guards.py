@@ -20,19 +20,6 @@ LAG = 0.1
 """The actual pose may lag the set-points by this much more than the look-ahead, s."""
 
 
-def ordered(box: Box) -> Box:
-    """Return a workspace whose minima lie below its maxima.
-
-    Raises
-    ------
-    ValueError
-        They do not.
-    """
-    if not all(low < high for low, high in zip(box[::2], box[1::2], strict=True)):
-        raise ValueError("each minimum of the workspace must lie below its maximum")
-    return box
-
-
 def check_streams(robot: Servo) -> None:
     """Refuse a robot that takes no set-points, before it is opened.
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from dmpcli.instruments.guards import Box
+from dmpcli.settings.execute import ExecuteSettings
 
 
 @dataclass(frozen=True)
@@ -25,3 +26,16 @@ class Limits:
     rotation_acceleration: float
     rotation_jerk: float
     workspace: Box | None = None
+
+
+def limits_of(settings: ExecuteSettings) -> Limits:
+    """Return the limits that the settings of a run state."""
+    return Limits(
+        settings.max_speed,
+        settings.max_acceleration,
+        settings.max_jerk,
+        settings.max_rotation_speed,
+        settings.max_rotation_acceleration,
+        settings.max_rotation_jerk,
+        settings.workspace,
+    )

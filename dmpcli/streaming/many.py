@@ -9,12 +9,13 @@ import numpy as np
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.instruments import guards
 from dmpcli.primitives.reach import Reach
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.streaming import plan as planning
 from dmpcli.streaming import preflight, session, tour
+from dmpcli.streaming.limits import limits_of
 from dmpcli.streaming.loop import Arm
 from dmpcli.streaming.plan import Plan
 from dmpcli.streaming.preflight import Check
-from dmpcli.streaming.settings import ExecuteSettings
 from dmpcli.streaming.stroke_file import Batch, Found, listed
 from dmpcli.streaming.tour import Ways
 
@@ -120,7 +121,7 @@ def prepare(
         return [Judged(*session.prepare(strokes[0], settings, state, reach))]
     between = ways(settings, arm.info.lookahead, presses)
     guards.check_ready(state)
-    start, first, limits = (state.position, state.rotation), strokes[0], settings.limits
+    start, first, limits = (state.position, state.rotation), strokes[0], limits_of(settings)
     goal = state.rotation if first.rotation is None else first.rotation[0]
     gap = planning.gap(start, (first.position[0], goal))
     standing = preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)

@@ -20,13 +20,14 @@ from dmpcli.primitives.reach import Reach
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.streaming import plan as planning
 from dmpcli.streaming import preflight
 from dmpcli.streaming.contact import LONG, Pressing, Touch
+from dmpcli.streaming.limits import limits_of
 from dmpcli.streaming.loop import DONE, Arm, Loop, Outcome, Watch
 from dmpcli.streaming.plan import Plan, Stroke
 from dmpcli.streaming.preflight import Check
-from dmpcli.streaming.settings import COUPLED, ExecuteSettings
 from dmpcli.streaming.stroke_file import Batch
 
 SENSOR_RATE = 100.0
@@ -84,7 +85,7 @@ def prepare(
     guards.check_ready(state)
     start = (state.position, state.rotation)
     goal = stroke.rotation[0] if stroke.rotation is not None else state.rotation
-    checks = preflight.at_rest(stroke, settings.speed, settings.period, settings.limits)
+    checks = preflight.at_rest(stroke, settings.speed, settings.period, limits_of(settings))
     if settings.approach is None:
         distance, angle = planning.gap(start, (stroke.position[0], goal))
         checks += preflight.near_start(
@@ -94,11 +95,11 @@ def prepare(
         stroke,
         settings.period,
         settings.speed,
-        settings.limits,
+        limits_of(settings),
         start,
         settings.approach or settings.lead_speed,
     )
-    checks += preflight.within_limits(made, stroke, settings.limits)
+    checks += preflight.within_limits(made, stroke, limits_of(settings))
     if reach is not None:
         standing = reach.standing(state.joints, *start)
         checks += preflight.by_joints(made, stroke, reach, standing)[0]

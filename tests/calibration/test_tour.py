@@ -5,7 +5,6 @@ import pytest
 
 from dmpcli.calibration import result
 from dmpcli.calibration.orientations import around
-from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.calibration.tour import Interrupted, Tour
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
@@ -17,6 +16,7 @@ from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
 from dmpcli.primitives.compensation import Compensation
 from dmpcli.primitives.reach import Reach
+from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.streaming.loop import Arm
 
 

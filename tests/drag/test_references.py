@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.drag import references
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import InputError
 from dmpcli.records.streams import Source
+from dmpcli.settings.record import RecordSettings
 
 
 def settings(**options):

@@ -201,6 +201,6 @@ def test_settings_that_do_not_go_together_are_refused_by_name(options, words):
 
 @pytest.mark.parametrize("preset", ["drag", "paper"])
 def test_the_presets_are_stable(preset):
-    from dmpcli.records import settings as layers
+    from dmpcli.settings import layers
 
     record_settings.check(layers.resolve(record_settings.RecordSettings, "record", {}, preset))

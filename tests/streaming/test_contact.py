@@ -10,8 +10,8 @@ from dmpcli.instruments.sensing import Sensing
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law, fast_filter
 from dmpcli.rotations import from_euler
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.streaming.contact import SETTLED_TIME, Pressing, Touch
-from dmpcli.streaming.settings import ExecuteSettings
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)

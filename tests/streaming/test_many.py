@@ -5,11 +5,11 @@ import pytest
 from streaming_fakes import plan, stroke
 
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.streaming import many
 from dmpcli.streaming.many import Judged
 from dmpcli.streaming.plan import Stroke
 from dmpcli.streaming.preflight import Check
-from dmpcli.streaming.settings import ExecuteSettings
 from dmpcli.streaming.stroke_file import Batch, Found
 
 

@@ -12,10 +12,10 @@ from dmpcli.instruments.mock import Lab, MockServo
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.kinematics import chain, inverse, models
 from dmpcli.primitives.reach import Reach
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.streaming import preflight, session, verdict
 from dmpcli.streaming.many import Judged
 from dmpcli.streaming.plan import Stroke
-from dmpcli.streaming.settings import ExecuteSettings
 
 EC66 = models.model("ec66")
 REACH = Reach(EC66)
