@@ -30,18 +30,18 @@ from dmpcli.control.loop_timing import LoopTiming
 from dmpcli.control.servo_loop import ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.control.watchdog import watched
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.planning import plan as planning
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas, streams
-from dmpcli.records import settings as layers
 from dmpcli.records import tool as tool_file
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance
+from dmpcli.settings import layers
+from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN, Scene
-from dmpcli.streaming.settings import ExecuteSettings
 
 BLOCKS = 3
 # A look-ahead that bears a busy machine: a benchmark that stops early measures nothing.
@@ -111,7 +111,7 @@ def recording(period: float, duration: float, folder: Path, at: Place) -> Measur
         "following_error": 100.0,
         "following_angle": 1.0,
     }
-    settings = layers.resolve(RecordSettings, "record", given, "drag")
+    settings = layers.resolve(RecordSettings, given, "drag")
     stroke, clock = reference_strokes.build(settings), Metered()
     bench = at.connect(clock, rehearsal.scene(stroke, settings))
     tutored = rehearsal.rehearse(bench.lab, stroke, settings)
@@ -137,7 +137,7 @@ def recording(period: float, duration: float, folder: Path, at: Place) -> Measur
 
 def executing(period: float, duration: float, folder: Path, at: Place) -> Measured:
     """Run the loop of `execute` on the real clock, with sensor, watchdog and journal."""
-    settings = layers.resolve(ExecuteSettings, "execute", {"period": period}, None)
+    settings = layers.resolve(ExecuteSettings, {"period": period}, None)
     t = np.arange(round(duration * 100.0) + 1) / 100.0
     s = t / t[-1]
     u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

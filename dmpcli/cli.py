@@ -1,33 +1,60 @@
 """The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
 
+import importlib
 import os
 import signal
 import sys
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
-from dmpcli.commands import (
-    calibrate,
-    execute,
-    fit,
-    generalize,
-    inspect,
-    record,
-    recover,
-    register,
-    report,
-    simulate,
-    touch,
-)
 from dmpcli.commands.pose_words import joined
 from dmpcli.errors import DmpError
 from dmpcli.version import __version__
 
+CONTEXT = {"help_option_names": ["-h", "--help"]}
+
+COMMANDS = {
+    "record": "Record one stroke that a hand drags the tool along.",
+    "fit": "Learn a skill from one or several demonstrations.",
+    "generalize": "Draw a skill at new start and goal points.",
+    "execute": "Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once.",  # noqa: E501
+    "report": "Compare strokes: wave heights, deviation, smoothness, ends, deadlines.",
+    "inspect": "Say what a file is: schema, columns, units, ranges, provenance.",
+    "recover": "Make the file that a crash kept `record` or `execute` from writing.",
+    "register": "Find where a part lies from points touched on it.",
+    "simulate": "Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C.",
+    "calibrate": "Identify what hangs on the sensor from static poses, with nothing touching the tool.",  # noqa: E501
+    "touch": "Lead the tip to a point by pendant or hand; Enter takes it, at rest, and q ends.",
+}
+"""Each subcommand, which is the module of `dmpcli.commands` of its name, in one sentence."""
+
+
+class Command(TyperCommand):
+    """Stands for a subcommand until it is called or asked; then its module is loaded."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
+    ) -> Any:
+        """Parse the words after the subcommand's name, by what its module declares."""
+        module = importlib.import_module(f"dmpcli.commands.{self.name}")
+        whole = typer.Typer(
+            add_completion=False,
+            rich_markup_mode=None,
+            pretty_exceptions_enable=False,
+            context_settings=CONTEXT,
+        )
+        whole.command(self.name)(module.command)
+        return typer.main.get_command(whole).make_context(info_name, args, parent, **extra)
+
 
 class Group(TyperGroup):
     """Turns a user's mistake into one message and its exit code; a defect keeps its traceback."""
+
+    def __init__(self, **said: Any) -> None:
+        super().__init__(**said)
+        self.commands = {name: Command(name, help=text) for name, text in COMMANDS.items()}
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words after the program's name; poses of six words become one value."""
@@ -51,19 +78,8 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=CONTEXT,
 )
-app.command("record")(record.command)
-app.command("fit")(fit.command)
-app.command("generalize")(generalize.command)
-app.command("execute")(execute.command)
-app.command("report")(report.command)
-app.command("inspect")(inspect.command)
-app.command("recover")(recover.command)
-app.command("register")(register.command)
-app.command("simulate")(simulate.command)
-app.command("calibrate")(calibrate.command)
-app.command("touch")(touch.command)
 
 
 def _version(asked: bool) -> None:

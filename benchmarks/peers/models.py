@@ -13,10 +13,9 @@ from pydmps.dmp_discrete import DMPs_discrete
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.generalization import Orientation, Pairs, curves, poses
+from dmpcli.primitives.choices import Choices, Method, Orientation
+from dmpcli.primitives.generalization import Pairs, curves, poses
 from dmpcli.primitives.learning import fit
-from dmpcli.primitives.regression import Method
 from dmpcli.primitives.smoothing import Stroke
 from dmpcli.surfaces.plane import pair_charts
 

@@ -9,7 +9,6 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
-from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.control import guards
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
@@ -20,10 +19,12 @@ from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
+from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Stroke
 from dmpcli.primitives.identification import check_orientations
 from dmpcli.primitives.reach import Reach
 from dmpcli.records.static_poses import StaticPose
+from dmpcli.settings.calibrate import CalibrateSettings
 
 _TRIES = 3
 
@@ -139,8 +140,8 @@ class Tour:
     def _way(self, start: Pose, goal: Pose) -> Plan:
         """Straight to a pose, and one period there."""
         s = self._settings
-        speed = s.limits.speed
-        return planning.make(self._there(goal), s.period, 1.0, s.limits, start, speed)
+        speed = _limits(s).speed
+        return planning.make(self._there(goal), s.period, 1.0, _limits(s), start, speed)
 
     def _go(self, goal: Pose, where: str) -> None:
         self._stop_if_asked()
@@ -153,7 +154,7 @@ class Tour:
         )
         loop = ServoLoop(
             self._way((state.position, state.rotation), goal),
-            s.limits,
+            _limits(s),
             watch,
             self._arm,
             ForceInput(self._sensing, self._change),
@@ -188,3 +189,16 @@ class Tour:
         number = self._interruption.number
         if number is not None:
             raise Interrupted(number, f"{signal.Signals(number).name}: stopped between two poses")
+
+
+def _limits(settings: CalibrateSettings) -> Limits:
+    """Limits of the set-points; the TCP stays where it is but for what the arm strayed."""
+    return Limits(
+        20.0,
+        200.0,
+        5000.0,
+        settings.max_rotation_speed,
+        settings.max_rotation_acceleration,
+        settings.max_rotation_jerk,
+        settings.workspace,
+    )

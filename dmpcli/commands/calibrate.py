@@ -6,21 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.options import (
-    AllowMixed,
-    Config,
-    Period,
-    Quiet,
-    Realtime,
-    Robot,
-    Sensor,
-    Workspace,
-)
+from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
 from dmpcli.errors import InputError, RefusedError, counted
 from dmpcli.messages import on_terminal
+from dmpcli.settings.calibrate import CalibrateSettings
+from dmpcli.settings.options import with_options
 
 if TYPE_CHECKING:
-    from dmpcli.calibration.settings import CalibrateSettings
     from dmpcli.control.signals import Interruption
     from dmpcli.control.workcell import Workcell
     from dmpcli.instruments.protocols import Clock, SensorInfo
@@ -30,9 +22,11 @@ if TYPE_CHECKING:
     from dmpcli.records.streams import Source
 
 
+@with_options
 def command(
+    *,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="TOOL", help="Tool file; - is stdout.")
+        str, typer.Option("--output", "-o", metavar="FILE", help="Tool file; - is stdout.")
     ],
     tool: Annotated[
         Path | None,
@@ -40,46 +34,21 @@ def command(
     ] = None,
     robot: Robot = "mock:",
     sensor: Sensor = "mock:",
-    poses: Annotated[int | None, typer.Option(metavar="N", help="How many (12).")] = None,
-    tilt: Annotated[
-        float | None, typer.Option(metavar="DEG", help="How far the tool is tilted (45).")
-    ] = None,
-    dwell: Annotated[
-        float | None, typer.Option(metavar="S", help="How long each pose is read (1).")
-    ] = None,
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="You move the arm; Enter takes a pose, q ends.")
     ] = False,
     from_file: Annotated[
-        str | None, typer.Option("--from", metavar="POSES", help="Poses that --save kept.")
+        str | None, typer.Option("--from", metavar="FILE", help="Poses that --save kept.")
     ] = None,
     save: Annotated[
-        str | None, typer.Option(metavar="POSES", help="Keep the poses as Parquet.")
+        str | None, typer.Option(metavar="FILE", help="Keep the poses as Parquet.")
     ] = None,
-    condition: Annotated[
-        float | None, typer.Option(metavar="NUMBER", help="Refuse a worse conditioned set (10).")
-    ] = None,
-    max_residual: Annotated[
-        float | None, typer.Option(metavar="N", help="Refuse poses that fit worse, RMS (0.3).")
-    ] = None,
-    period: Period = None,
-    max_rotation_speed: Annotated[float | None, typer.Option(metavar="RAD_PER_S")] = None,
-    max_force: Annotated[
-        float | None, typer.Option(metavar="N", help="Stop when the reading changes by more (30).")
-    ] = None,
-    max_torque: Annotated[
-        float | None, typer.Option(metavar="N_M", help="Stop when the reading changes by more (3).")
-    ] = None,
-    workspace: Workspace = None,
+    settings: CalibrateSettings,
     realtime: Realtime = False,
     allow_mixed: AllowMixed = False,
     force: Annotated[
         bool, typer.Option("--force", help="Replace files from real instruments.")
     ] = False,
-    preset: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE.toml", help="[calibrate] section.")
-    ] = None,
-    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Identify what hangs on the sensor from static poses, with nothing touching the tool.
@@ -88,25 +57,8 @@ def command(
     for a tilt of 45° all around, or say less with --tilt.
     """
     on_terminal(quiet)
-    import math
-
-    from dmpcli.calibration.settings import CalibrateSettings
-    from dmpcli.records import settings as layers
     from dmpcli.records import streams
 
-    given = {
-        "poses": poses,
-        "tilt": None if tilt is None else math.radians(tilt),
-        "dwell": dwell,
-        "condition": condition,
-        "max_residual": max_residual,
-        "period": period,
-        "max_rotation_speed": max_rotation_speed,
-        "max_force": max_force,
-        "max_torque": max_torque,
-        "workspace": workspace,
-    }
-    settings = layers.resolve(CalibrateSettings, "calibrate", given, preset, config)
     if from_file is not None and (by_hand or save is not None):
         raise InputError("--from: reads poses; --by-hand and --save take new ones")
     if "-" in (output, save) and output == save:
@@ -279,7 +231,7 @@ def _save(
         "sensor": result.identity(info).model_dump(),
     }
     inputs = () if source is None else (input_of("tool", source),)
-    provenance = Provenance("calibrate", options | settings.model_dump(mode="json"), inputs, facts)
+    provenance = Provenance("calibrate", options | settings.as_options(), inputs, facts)
     streams.write(request.save, static_poses.encode(taken, provenance))
 
 
@@ -302,7 +254,7 @@ def _conclude(
     calibration = tool_file.calibrated(
         found,
         sensor,
-        options | settings.model_dump(mode="json"),
+        options | settings.as_options(),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
     )
     streams.write(

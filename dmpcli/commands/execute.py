@@ -6,22 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from dmpcli.commands.options import (
-    SENSORS,
-    AllowMixed,
-    Config,
-    FollowingError,
-    MaxForce,
-    MaxTorque,
-    Period,
-    Quiet,
-    Realtime,
-    Robot,
-    ToolCheck,
-    Workspace,
-)
+from dmpcli.commands.options import SENSORS, AllowMixed, Quiet, Realtime, Robot
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
+from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.settings.options import Given, with_options
 
 if TYPE_CHECKING:
     from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -34,17 +23,18 @@ if TYPE_CHECKING:
     from dmpcli.primitives.wrench import Tool
     from dmpcli.records.record import Provenance
     from dmpcli.records.streams import Source
-    from dmpcli.streaming.settings import ExecuteSettings
     from dmpcli.workflows.keeping import Keeper
 
 
+@with_options
 def command(
+    *,
     trajectory: Annotated[
         str, typer.Argument(metavar="TRAJECTORY", help="File or batch folder; - is stdin.")
     ],
     output: Annotated[
         str | None,
-        typer.Option("-o", "--output", metavar="RUN", help="Run file; - is stdout."),
+        typer.Option("-o", "--output", metavar="FILE", help="Run file; - is stdout."),
     ] = None,
     robot: Robot = "mock:",
     sensor: Annotated[
@@ -57,14 +47,8 @@ def command(
         typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66."),
     ] = None,
     coupling: Annotated[
-        Literal["force"] | None, typer.Option(help="Press on the surface, eq. (10).")
-    ] = None,
-    force_setpoint: Annotated[
-        float | None, typer.Option(metavar="N", help="Force to press with (5).")
-    ] = None,
-    speed: Annotated[
-        float | None,
-        typer.Option(metavar="F", help="1 as planned; below 1 the ways are slower too."),
+        Literal["force"] | None,
+        typer.Option(metavar="force", help="Press on the surface, eq. (10)."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only check; print the verdict, send nothing.")
@@ -75,76 +59,22 @@ def command(
             "--id", metavar="ID", help="Which of several strokes, in this order; all by default."
         ),
     ] = None,
-    clearance: Annotated[
-        float | None,
-        typer.Option(metavar="MM", help="Lift the pen by this after each stroke (20 for several)."),
-    ] = None,
-    transfer_speed: Annotated[
-        float | None, typer.Option(metavar="MM_PER_S", help="Through the air, at most (100).")
-    ] = None,
-    retract_speed: Annotated[
-        float | None, typer.Option(metavar="MM_PER_S", help="Off the work, at most (50).")
-    ] = None,
-    period: Period = None,
-    approach: Annotated[
-        float | None,
-        typer.Option(metavar="MM_PER_S", help="Go to the start, no faster than this."),
-    ] = None,
-    start_tolerance: Annotated[
-        float | None, typer.Option(metavar="MM", help="How far off the start the arm may stand.")
-    ] = None,
-    workspace: Workspace = None,
-    max_speed: Annotated[float | None, typer.Option(metavar="MM_PER_S")] = None,
-    max_acceleration: Annotated[float | None, typer.Option(metavar="MM_PER_S2")] = None,
-    max_jerk: Annotated[float | None, typer.Option(metavar="MM_PER_S3")] = None,
-    max_rotation_speed: Annotated[float | None, typer.Option(metavar="RAD_PER_S")] = None,
-    max_rotation_acceleration: Annotated[float | None, typer.Option(metavar="RAD_PER_S2")] = None,
-    max_rotation_jerk: Annotated[float | None, typer.Option(metavar="RAD_PER_S3")] = None,
-    following_error: FollowingError = None,
-    max_force: MaxForce = None,
-    max_torque: MaxTorque = None,
-    tool_check: ToolCheck = None,
+    settings: ExecuteSettings,
+    given: Given,
     realtime: Realtime = False,
     allow_mixed: AllowMixed = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
-    preset: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE.toml", help="[execute] section.")
-    ] = None,
-    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once."""
     on_terminal(quiet)
-    from dmpcli.records.settings import resolve
-    from dmpcli.streaming.settings import ExecuteSettings
-
-    given = {
-        "force_setpoint": force_setpoint,
-        "speed": speed,
-        "period": period,
-        "approach": approach,
-        "clearance": clearance,
-        "transfer_speed": transfer_speed,
-        "retract_speed": retract_speed,
-        "start_tolerance": start_tolerance,
-        "workspace": workspace,
-        "max_speed": max_speed,
-        "max_acceleration": max_acceleration,
-        "max_jerk": max_jerk,
-        "max_rotation_speed": max_rotation_speed,
-        "max_rotation_acceleration": max_rotation_acceleration,
-        "max_rotation_jerk": max_rotation_jerk,
-        "following_error": following_error,
-        "max_force": max_force,
-        "max_torque": max_torque,
-        "tool_check": tool_check,
-    }
-    settings = resolve(ExecuteSettings, "execute", given, preset, config)
-    if coupling is None and force_setpoint is not None:
+    if coupling is None and "force_setpoint" in given:
         raise InputError("--force-setpoint: nothing presses without --coupling force")
-    for option, most in (("--max-force", max_force), ("--max-torque", max_torque)):
-        if most is not None and sensor is None and coupling is None:
-            raise InputError(f"{option}: nothing feels a force without --sensor URL")
+    for option in ("max_force", "max_torque"):
+        if option in given and sensor is None and coupling is None:
+            raise InputError(
+                f"--{option.replace('_', '-')}: nothing feels a force without --sensor URL"
+            )
     if output is None and not dry_run:
         raise InputError("-o: name the run file, or ask for the checks alone with --dry-run")
     _execute(
@@ -333,6 +263,7 @@ def _loop(
     from dmpcli.control.playback import Playback
     from dmpcli.control.servo_loop import ServoLoop
     from dmpcli.instruments.protocols import PlanPlayer
+    from dmpcli.planning.limits import limits_of
 
     touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
@@ -342,7 +273,7 @@ def _loop(
         touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
     watch = execution.watch(settings)
     kind = Playback if isinstance(arm.servo, PlanPlayer) else ServoLoop
-    return kind(plans[0], settings.limits, watch, arm, touch, keeper.hindrance, plans[1:])
+    return kind(plans[0], limits_of(settings), watch, arm, touch, keeper.hindrance, plans[1:])
 
 
 def _tool(bench: "Workcell", tool_file: "Source | None") -> "Tool":
@@ -369,7 +300,7 @@ def _provenance(
     changes = request.sensor is not None or not request.robot.startswith(workcell.MOCK)
     if tool_file is not None and changes:
         inputs.append(input_of("tool", tool_file))
-    options = settings.model_dump(mode="json")
+    options = settings.as_options()
     options |= {
         "robot": workcell.in_provenance(request.robot),
         "sensor": workcell.in_provenance(request.sensor),

@@ -1,32 +1,22 @@
 """``dmpcli generalize``: a skill and new start-goal pairs in, trajectories out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated
 
 import typer
 
-from dmpcli.commands.options import SURFACES, Config, Point, Quiet, SurfacePose, SurfaceUnit
-from dmpcli.commands.process_options import (
-    Copies,
-    KeepOut,
-    Lead,
-    Margin,
-    Spacing,
-    Tilt,
-    ToolAcceleration,
-    ToolSpeed,
-)
+from dmpcli.commands.options import SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.process_options import KeepOut
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell
-
-if TYPE_CHECKING:
-    pass
-
-_PLACED = 100
-"""Pairs off the surface that are told where it is instead."""
+from dmpcli.settings.batch import BatchOptions
+from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
+from dmpcli.settings.options import Given, with_options
 
 
+@with_options
 def command(
+    *,
     skill: Annotated[
         Path, typer.Argument(help="Skill file of fit; - is standard input.", show_default=False)
     ],
@@ -35,20 +25,14 @@ def command(
         typer.Option(
             "-o",
             "--output",
+            metavar="FILE|DIR",
             help="Trajectory file (Parquet), or with --pairs a folder.",
             show_default=False,
         ),
     ],
     start: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New start, mm.")] = None,
     goal: Annotated[Point | None, typer.Option(metavar="X Y Z", help="New goal, mm.")] = None,
-    in_: Annotated[
-        str,
-        typer.Option(
-            "--in",
-            metavar="base|part",
-            help="Axes of start, goal and pairs: the base's, or the surface's own.",
-        ),
-    ] = "base",
+    place: PlaceOptions,
     reproduce: Annotated[
         bool, typer.Option("--reproduce", help="At the demonstrated start and goal.")
     ] = False,
@@ -62,7 +46,10 @@ def command(
     ] = None,
     pairs: Annotated[
         Path | None,
-        typer.Option(help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration]."),
+        typer.Option(
+            metavar="FILE",
+            help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration].",
+        ),
     ] = None,
     surface: Annotated[
         Path | None,
@@ -70,88 +57,10 @@ def command(
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
-    on_border: Annotated[
-        str,
-        typer.Option(
-            help="A stroke that leaves the surface: fail, clip it there, split it, or skip it."
-        ),
-    ] = "fail",
-    duration: Annotated[
-        float | None, typer.Option(help="Of the stroke, s. Default: as demonstrated.")
-    ] = None,
-    rate: Annotated[float | None, typer.Option(help="Samples per second, Hz (50).")] = None,
-    amplitude: Annotated[
-        str | None, typer.Option(help="keep the wave height, or scale it with the distance.")
-    ] = None,
-    orientation: Annotated[
-        str | None,
-        typer.Option(help="keep the tool's turn in base axes, or turn with the surface."),
-    ] = None,
-    ease_in: Annotated[float | None, typer.Option(help="Soft start, s.")] = None,
-    ease_out: Annotated[float | None, typer.Option(help="Soft end, s.")] = None,
-    snap_tol: Annotated[
-        float | None, typer.Option(help="How far start and goal may lie off the surface, mm (1).")
-    ] = None,
-    contact: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MM",
-            help="How near to the surface the pen touches; drawn on it, deeper is refused (1).",
-        ),
-    ] = None,
-    offset: Annotated[
-        float | None,
-        typer.Option(metavar="MM", help="Off the surface: stand-off, or negative, engraving."),
-    ] = None,
-    scale: Annotated[
-        float | None, typer.Option(metavar="F", help="Size of a closed stroke (1).")
-    ] = None,
-    turn: Annotated[
-        float | None, typer.Option(metavar="DEG", help="Turn of a closed stroke, degrees (0).")
-    ] = None,
-    allow_stretch: Annotated[
-        bool | None,
-        typer.Option(
-            "--allow-stretch",
-            help="Start and goal at any distance, however it distorts.",
-            show_default=False,
-        ),
-    ] = None,
-    lead: Lead = None,
-    tilt: Tilt = None,
-    tool_speed: ToolSpeed = None,
-    tool_acceleration: ToolAcceleration = None,
-    border_margin: Margin = None,
+    settings: GeneralizeSettings,
     keep_out: KeepOut = None,
-    copies: Copies = None,
-    spacing: Spacing = None,
-    on_error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="stop|skip",
-            help="A bad pair stops all before anything is written (default), or is skipped.",
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(help="Processes that draw a table of pairs (1).")
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="Draw on a Dask cluster."),
-    ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(metavar="I/N", help="Draw only every N-th part, from the I-th on."),
-    ] = None,
-    pairs_per_part: Annotated[
-        int | None, typer.Option(help="Pairs in one file of the folder (2000).")
-    ] = None,
-    float32: Annotated[
-        bool, typer.Option("--float32", help="Store poses in single precision.")
-    ] = False,
-    compression: Annotated[
-        str | None, typer.Option(metavar="zstd|lz4|snappy|none", help="Of the parts (zstd).")
-    ] = None,
+    wanted: BatchOptions,
+    given: Given,
     robot_model: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66."),
@@ -160,10 +69,6 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Tool file: where the TCP is on the arm's flange."),
     ] = None,
-    preset: Annotated[
-        str | None, typer.Option(help="TOML file with a [generalize] section.")
-    ] = None,
-    config: Config = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw a skill at new start and goal points."""
@@ -171,56 +76,16 @@ def command(
     from dmpcli.commands import batches as batch_options
     from dmpcli.records import learned_skill, streams
     from dmpcli.records import pairs as pair_file
-    from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.record import encode
-    from dmpcli.records.settings import resolve
     from dmpcli.workflows import batches, process, single, surface_input
     from dmpcli.workflows.generalize import Order, prepared
     from dmpcli.workflows.generalize_inputs import one_pair
 
-    settings = resolve(
-        GeneralizeSettings,
-        "generalize",
-        {
-            "duration": duration,
-            "rate": rate,
-            "amplitude": amplitude,
-            "orientation": orientation,
-            "ease_in": ease_in,
-            "ease_out": ease_out,
-            "snap_tol": snap_tol,
-            "contact": contact,
-            "offset": offset,
-            "scale": scale,
-            "turn": turn,
-            "allow_stretch": allow_stretch,
-            "lead": lead,
-            "tilt": tilt,
-            "tool_speed": tool_speed,
-            "tool_acceleration": tool_acceleration,
-            "border_margin": border_margin,
-            "copies": copies,
-            "spacing": spacing,
-        },
-        preset,
-        config,
-    )
-    wanted = batch_options.asked(
-        pairs, on_error, jobs, cluster, shard, pairs_per_part, float32, compression
-    )
-    _check_together(
-        pairs,
-        (start_orientation, goal_orientation),
-        surface,
-        {
-            "--contact": contact,
-            "--offset": offset,
-        },
-    )
-    leaving = process.leaving(on_border)
-    process.check(settings, orientation, surface, keep_out)
+    batch_options.check(wanted, given, pairs is not None)
+    _check_together(pairs, (start_orientation, goal_orientation), surface, given)
+    process.check(settings, given, surface, keep_out)
     surface_input.check_options(surface, surface_pose, surface_unit)
-    frame = _frame(in_, surface, reproduce)
+    _check_frame(place.in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import nursery
@@ -240,7 +105,7 @@ def command(
         options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
         source = streams.read(pairs)
-        table, options = pair_file.read(source), wanted.options
+        table, options = pair_file.read(source), wanted.as_options()
         inputs.append({"role": "pairs", "sha256": source.sha256})
     ready = prepared(
         Order(
@@ -248,8 +113,8 @@ def command(
             table,
             settings,
             read,
-            frame,
-            leaving,
+            place.in_,
+            place.on_border,
             keep_out,
             robot_model,
             tool,
@@ -270,7 +135,7 @@ def _check_together(
     pairs: Path | None,
     orientations: tuple[Point | None, Point | None],
     surface: Path | None,
-    of_surface: dict[str, Any],
+    given: Given,
 ) -> None:
     """Refuse options that say nothing without one another, or say it twice."""
     if pairs is not None and any(orientations):
@@ -278,19 +143,16 @@ def _check_together(
             "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
             "--start-orientation and --goal-orientation out"
         )
-    alone = [name for name, value in of_surface.items() if value is not None]
+    alone = [f"--{name}" for name in ("contact", "offset") if name in given]
     if surface is None and alone:
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
 
 
-def _frame(in_: str, surface: Path | None, reproduce: bool) -> 'Literal["base", "part"]':
-    if in_ not in ("base", "part"):
-        raise InputError(f"--in {in_}: must be base or part")
+def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
     if in_ == "part" and surface is None:
         raise InputError("--in part: the axes of which part? Name it with --surface")
     if in_ == "part" and reproduce:
         raise InputError("--reproduce takes the demonstrated ends, in the base; leave --in out")
-    return "part" if in_ == "part" else "base"
 
 
 def _check_destination(

@@ -5,69 +5,33 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmpcli.commands.options import (
-    AllowMixed,
-    Config,
-    DrawnEnd,
-    FollowingError,
-    MaxForce,
-    MaxTorque,
-    Periods,
-    Quiet,
-    Realtime,
-    Robot,
-    Sensor,
-    ToolCheck,
-    WaveHeight,
-    Workspace,
-)
+from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell, wanted, warn
+from dmpcli.settings.options import Given, with_options
+from dmpcli.settings.record import TUTOR, RecordSettings, check
 
 if TYPE_CHECKING:
     from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.drag_loop import Recorder
-    from dmpcli.drag.settings import RecordSettings
     from dmpcli.records.record import Provenance, Record
     from dmpcli.records.streams import Source
     from dmpcli.simulation.reference_strokes import Reference
 
-_TUTOR = ("reference", "start", "goal", "wave_height", "periods", "seed")
-"""Settings of the mock's hand, which mean nothing where a person draws."""
 
-
+@with_options
 def command(
-    output: Annotated[str, typer.Option("--output", "-o", help="Demonstration; - is stdout.")],
+    *,
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="FILE", help="Demonstration; - is stdout.")
+    ],
     sensor: Sensor = "mock:",
     robot: Robot = "mock:",
     tool: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Tool file; the mock knows its own.")
     ] = None,
-    drag: Annotated[
-        str | None, typer.Option(metavar="admittance|builtin", help="Who moves the arm.")
-    ] = None,
-    preset: Annotated[
-        str, typer.Option(metavar="NAME|FILE.toml", help="drag, paper, or your own.")
-    ] = "drag",
-    config: Config = None,
-    duration: Annotated[float | None, typer.Option(help="End after so many s.")] = None,
-    until_rest: Annotated[
-        float | None, typer.Option(help="End once the tool has moved and rested for so many s.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the mock's hand and sensor.")] = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(metavar="sine|line|circle|FILE.csv", help="What the mock tutor draws."),
-    ] = None,
-    start: DrawnEnd = None,
-    goal: DrawnEnd = None,
-    wave_height: WaveHeight = None,
-    periods: Periods = None,
-    following_error: FollowingError = None,
-    tool_check: ToolCheck = None,
-    max_force: MaxForce = None,
-    max_torque: MaxTorque = None,
-    workspace: Workspace = None,
+    settings: RecordSettings,
+    given: Given,
     realtime: Realtime = False,
     allow_mixed: AllowMixed = False,
     force: Annotated[
@@ -82,9 +46,7 @@ def command(
     from dmpcli.control.drag_loop import DEFECT, Recorder
     from dmpcli.control.signals import Interruption
     from dmpcli.control.watchdog import watched
-    from dmpcli.drag.settings import RecordSettings, check
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.records import settings as layers
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
     from dmpcli.records.schemas import DEMONSTRATION
@@ -92,23 +54,6 @@ def command(
     from dmpcli.simulation.mock import PEN
     from dmpcli.workflows.keeping import Keeper
 
-    given = {
-        "drag": drag,
-        "duration": duration,
-        "until_rest": until_rest,
-        "seed": seed,
-        "reference": reference,
-        "start": start,
-        "goal": goal,
-        "wave_height": wave_height,
-        "periods": periods,
-        "following_error": following_error,
-        "max_force": max_force,
-        "max_torque": max_torque,
-        "tool_check": tool_check,
-        "workspace": workspace,
-    }
-    settings = layers.resolve(RecordSettings, "record", given, preset, config)
     check(settings)
     addresses = workcell.check(robot, sensor, allow_mixed)
     repeatable = workcell.repeatable(addresses)
@@ -183,9 +128,9 @@ def command(
         raise typer.Exit(128 + signals.number)
 
 
-def _check_tutored(given: dict[str, Any], simulated: bool) -> None:
+def _check_tutored(given: Given, simulated: bool) -> None:
     """Refuse what only the mock's tutor understands where a person drags a real tool."""
-    alone = next((key for key in _TUTOR if given[key] is not None), None)
+    alone = next((key for key in TUTOR if key in given), None)
     if alone is not None and not simulated:
         raise InputError(
             f"--{alone.replace('_', '-')}: is of the mock's hand, and a person drags a real tool; "
@@ -233,11 +178,11 @@ def _provenance(
     """Return what is known of the recording before it is made; of the stroke only by the tutor."""
     from dmpcli.records.record import Provenance, input_of
 
-    settled = settings.model_dump(mode="json")
+    settled = settings.as_options()
     facts: dict[str, Any] = {"simulated": simulated}
     sources = [("tool", tool)]
     if tutored is None:
-        settled = {key: value for key, value in settled.items() if key not in _TUTOR}
+        settled = {key: value for key, value in settled.items() if key not in TUTOR}
     else:
         facts["reference"] = tutored.facts
         # The reference's name may be a path; what it holds stands in the inputs.

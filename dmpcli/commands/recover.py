@@ -19,7 +19,8 @@ def command(
         str, typer.Argument(metavar="JOURNAL", help="What the crash left; - is stdin.")
     ],
     output: Annotated[
-        str, typer.Option("--output", "-o", help="Demonstration or run; - is stdout.")
+        str,
+        typer.Option("--output", "-o", metavar="FILE", help="Demonstration or run; - is stdout."),
     ],
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     quiet: Quiet = False,

@@ -8,12 +8,16 @@ import typer
 from dmpcli.commands.options import Quiet
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
+from dmpcli.settings.options import with_options
+from dmpcli.settings.register import RegisterOptions
 
 LARGE = 100_000
 """Faces on which the search takes some seconds."""
 
 
+@with_options
 def command(
+    *,
     part: Annotated[
         Path,
         typer.Argument(
@@ -29,32 +33,19 @@ def command(
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Pose file (JSON).", show_default=False)
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Pose file (JSON).", show_default=False
+        ),
     ],
     initial: Annotated[
         str | None,
         typer.Option(
             metavar="X Y Z RX RY RZ|FILE",
-            help="Rough pose to begin from, mm and rad. Default: that of px py pz, or no motion.",
+            help="Rough pose to begin from, mm and rad.  [default: that of px py pz, or no motion]",
         ),
     ] = None,
-    guess: Annotated[
-        str,
-        typer.Option(
-            metavar="near|none",
-            help="Search near the rough pose, or with none in all orientations.",
-        ),
-    ] = "near",
-    unit: Annotated[
-        str, typer.Option(help="Of the part's file and of px py pz: mm, cm, m or in.")
-    ] = "mm",
-    max_residual: Annotated[
-        float, typer.Option(help="Largest distance of a touched point from the part, mm.")
-    ] = 1.0,
-    max_error: Annotated[
-        float,
-        typer.Option(help="Largest error left at any point of the part, with 95 %, mm."),
-    ] = 1.5,
+    settings: RegisterOptions,
     quiet: Quiet = False,
 ) -> None:
     """Find where a part lies from points touched on it."""
@@ -66,10 +57,12 @@ def command(
     from dmpcli.records import touched as touched_file
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.registration import LIMIT, Part
+    from dmpcli.surfaces.registration import Part
     from dmpcli.workflows.pose_hints import warn_of_angles
 
-    _check(max_residual, max_error, guess, initial)
+    guess, unit, max_error = settings.guess, settings.unit, settings.max_error
+    if guess == "none" and initial is not None:
+        raise InputError("--guess none searches all orientations; leave --initial out")
     streams.check_writable(output)
     sources = {"part": streams.read(part), "touched": streams.read(touched)}
     waiting = mesh.waiting(sources["part"])
@@ -95,7 +88,7 @@ def command(
         first = register_checks.rough_pose(points, scale, rough, guess)
         result = register_checks.registered(points, part_shape, scale, first, max_error)
     register_checks.refuse_unsure(
-        result, points, part_shape, first, max_residual, max_error, initial is not None
+        result, points, part_shape, first, settings.max_residual, max_error, initial is not None
     )
     conditioning = result.conditioning
     content = pose.encode(
@@ -111,20 +104,10 @@ def command(
         ),
         {"unit": unit, "initial": initial if "initial" not in sources else None}
         | ({} if guess == "near" else {"guess": guess})
-        | ({} if max_error == LIMIT else {"max_error": max_error}),
+        | ({} if max_error == RegisterOptions.max_error else {"max_error": max_error}),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
         unit,
         register_checks.runner_up(result),
     )
     streams.write(output, content)
     register_checks.tell_of(result, points, str(output), first)
-
-
-def _check(max_residual: float, max_error: float, guess: str, initial: str | None) -> None:
-    for option, value in (("--max-residual", max_residual), ("--max-error", max_error)):
-        if not value > 0.0:
-            raise InputError(f"{option} {value:g}: must be a length above 0")
-    if guess not in ("near", "none"):
-        raise InputError(f"--guess {guess}: must be near or none")
-    if guess == "none" and initial is not None:
-        raise InputError("--guess none searches all orientations; leave --initial out")

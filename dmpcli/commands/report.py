@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dmpcli.commands import recording_options
-from dmpcli.commands.options import SURFACES, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import SURFACES, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
+from dmpcli.settings.options import with_options
+from dmpcli.settings.recording import RecordingOptions
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
@@ -27,7 +29,9 @@ _SHOWN = 3
 _WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
 
 
+@with_options
 def command(
+    *,
     files: Annotated[
         list[str],
         typer.Argument(
@@ -49,21 +53,11 @@ def command(
             "-o", "--output", metavar="DIR", help="Also write report.json, CSV and figures here."
         ),
     ] = None,
-    layout: recording_options.LayoutName = None,
-    map_: recording_options.Map = None,
-    columns: recording_options.Columns = None,
-    body: recording_options.Body = None,
-    length_unit: recording_options.LengthUnit = None,
-    time_unit: recording_options.TimeUnit = None,
-    angle_unit: recording_options.AngleUnit = None,
-    rotation: recording_options.Rotation = None,
-    sample_rate: recording_options.SampleRate = None,
-    repeated_stamps: recording_options.Repeated = None,
-    decimal: recording_options.Decimal = None,
+    form: RecordingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
     ] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No messages.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     on_terminal(quiet)
@@ -77,25 +71,13 @@ def command(
     surface_input.check_options(surface, surface_pose, surface_unit)
     if output is not None and output.exists() and not output.is_dir():
         raise InputError(f"{output}: is a file, -o needs the name of a folder")
-    form = recording_options.layout_of(
-        layout,
-        map_,
-        columns,
-        body=body,
-        length=length_unit,
-        time=time_unit,
-        angle=angle_unit,
-        rotation=rotation,
-        sample_rate=sample_rate,
-        repeated=repeated_stamps,
-        decimal=decimal,
-    )
+    layout = form.as_layout()
     ground = said = normal = read = None
     if surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
         ground, said, normal = _ground(read)
     labels = strokes.labels_of(files)
-    parts = [_part(name, label, normal, form) for name, label in zip(files, labels, strict=True)]
+    parts = [_part(name, label, normal, layout) for name, label in zip(files, labels, strict=True)]
     parts = _seen(parts, ground)
     if ground is not None:
         parts = _placed(parts, ground)

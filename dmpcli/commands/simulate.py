@@ -7,19 +7,17 @@ import typer
 
 from dmpcli.commands.options import (
     SURFACES,
-    Config,
-    DrawnEnd,
-    Periods,
     Quiet,
     SurfacePose,
     SurfaceUnit,
-    WaveHeight,
 )
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell, warn
+from dmpcli.settings.options import Only, with_options
+from dmpcli.settings.record import TUTOR, RecordSettings, check
+from dmpcli.settings.simulate import SimulateOptions
 
 if TYPE_CHECKING:
-    from dmpcli.drag.settings import RecordSettings
     from dmpcli.primitives.wrench import Tool
     from dmpcli.simulation.elite_server.faults import LabFaults
     from dmpcli.simulation.elite_server.lab import Setting
@@ -30,25 +28,10 @@ CLEARANCE = 0.1
 """mm between the parked pen and the plate: `calibrate` must touch nothing."""
 
 
+@with_options
 def command(
-    sensor_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Sensor box, UDP; 0 is a free one.")
-    ] = 49152,
-    http_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Its pages; 0 is a free one.")
-    ] = 8080,
-    tcp_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Its TCP interface; 0 is a free one.")
-    ] = 49151,
-    robot_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Controller, JSON-RPC; 0 is a free one.")
-    ] = 8055,
-    monitor_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Its monitor; 0 is a free one.")
-    ] = 8056,
-    host: Annotated[
-        str, typer.Option(help="Address to serve; any other than loopback opens it to a network.")
-    ] = "127.0.0.1",
+    *,
+    served: SimulateOptions,
     surface: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help=f"What the tool touches: {SURFACES}; else a flat plate."),
@@ -58,42 +41,11 @@ def command(
     tool: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The tool as it truly is; else a pen.")
     ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KIND[=VALUE][@T]",
-            help="What goes wrong: loss, duplicate, reorder, malformed, silence, saturation, "
-            "estop, collision, mode, refuse, drop; or what the controller does: underrun, jump, "
-            "euler, newline. See docs/simulate.md.",
-        ),
-    ] = None,
-    strokes: Annotated[
-        int, typer.Option(min=0, help="How many strokes the hand draws before it stays away.")
-    ] = 1,
-    lookahead: Annotated[
-        float,
-        typer.Option(min=0.0, max=1.0, help="Of the arm that the hand has practised with, s."),
-    ] = 0.1,
     drawn: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Keep where the hand truly drew; a demonstration file."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of hand, sensor and faults.")] = None,
-    preset: Annotated[
-        str, typer.Option(metavar="NAME|FILE.toml", help="[record]: what the hand has practised.")
-    ] = "drag",
-    config: Config = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Of the hand's stroke with its rests, s.")
-    ] = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(metavar="sine|line|circle|FILE.csv", help="What the hand draws."),
-    ] = None,
-    start: DrawnEnd = None,
-    goal: DrawnEnd = None,
-    wave_height: WaveHeight = None,
-    periods: Periods = None,
+    settings: Annotated[RecordSettings, Only("duration", *TUTOR)],
     quiet: Quiet = False,
 ) -> None:
     """Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C."""
@@ -102,40 +54,36 @@ def command(
 
     from dmpcli.control.drag_loop import LONGEST_LOOKAHEAD
     from dmpcli.control.signals import Interruption
-    from dmpcli.drag.settings import RecordSettings, check
     from dmpcli.records import streams
-    from dmpcli.records.settings import resolve
     from dmpcli.simulation.elite_server import faults as fault_words
     from dmpcli.simulation.elite_server.lab import VirtualLab
     from dmpcli.simulation.elite_server.lab_server import LabServer, Ports
 
-    given = {
-        "duration": duration,
-        "seed": seed,
-        "reference": reference,
-        "start": start,
-        "goal": goal,
-        "wave_height": wave_height,
-        "periods": periods,
-    }
-    settings = resolve(RecordSettings, "record", given, preset, config)
     check(settings)
-    if lookahead > LONGEST_LOOKAHEAD:
+    if served.lookahead > LONGEST_LOOKAHEAD:
         warn(
-            f"--lookahead {lookahead:g}: above {LONGEST_LOOKAHEAD:g} s the drag swings to and fro, "
-            "however well the hand has practised"
+            f"--lookahead {served.lookahead:g}: above {LONGEST_LOOKAHEAD:g} s the drag swings to "
+            "and fro, however well the hand has practised"
         )
-    faults = fault_words.parse(fault or ())
+    faults = fault_words.parse(served.fault)
     if drawn is not None:
         streams.check_writable(drawn)
-    setting, hand = _scene(settings, faults, tool, strokes, lookahead)
+    setting, hand = _scene(settings, faults, tool, served.strokes, served.lookahead)
     if surface is not None:
         setting = _on(surface, surface_pose, surface_unit, setting)
     elif surface_pose is not None or surface_unit is not None:
         raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
-    ports = Ports(sensor_port, http_port, tcp_port, robot_port, monitor_port)
+    ports = Ports(
+        served.sensor_port,
+        served.http_port,
+        served.tcp_port,
+        served.robot_port,
+        served.monitor_port,
+    )
     with Interruption() as signals:
-        with LabServer(VirtualLab(setting, hand), faults, host, ports, settings.seed) as serving:
+        with LabServer(
+            VirtualLab(setting, hand), faults, served.host, ports, settings.seed
+        ) as serving:
             line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
             print(line, flush=True)  # noqa: T201
             tell("serving; Ctrl-C ends it")
@@ -216,5 +164,5 @@ def _track(hand: "VisitingHand", settings: "RecordSettings") -> bytes:
     times, positions, rotations = (np.array(each) for each in zip(*hand.track, strict=True))
     rows = np.column_stack([times - times[0], positions, to_euler(rotations)])
     columns = dict(zip(("t", "x", "y", "z", "rx", "ry", "rz"), rows.T, strict=True))
-    options = settings.model_dump(mode="json")
+    options = settings.as_options()
     return encode(Record(DEMONSTRATION, columns, Provenance("simulate", options=options)))

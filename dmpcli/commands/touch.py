@@ -8,6 +8,8 @@ import typer
 from dmpcli.commands.options import Quiet, Realtime, Robot
 from dmpcli.errors import InputError, counted
 from dmpcli.messages import on_terminal
+from dmpcli.settings.options import with_options
+from dmpcli.settings.touch import TouchOptions
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
@@ -17,9 +19,11 @@ if TYPE_CHECKING:
     from dmpcli.records.points import PointFile
 
 
+@with_options
 def command(
+    *,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="CSV", help="Points; - is stdout.")
+        str, typer.Option("--output", "-o", metavar="FILE", help="Points; - is stdout.")
     ],
     robot: Robot = "mock:",
     tool: Annotated[
@@ -33,14 +37,9 @@ def command(
     ] = False,
     part: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="px py pz of the part's points, in order, for register."),
+        typer.Option(metavar="FILE", help="px py pz of the part's points, in order, for register."),
     ] = None,
-    every: Annotated[
-        float | None, typer.Option(metavar="S", help="Take a point in even times, not at Enter.")
-    ] = None,
-    count: Annotated[
-        int | None, typer.Option(metavar="N", help="End after so many points.")
-    ] = None,
+    settings: TouchOptions,
     realtime: Realtime = False,
     force: Annotated[bool, typer.Option("--force", help="Replace points of a real arm.")] = False,
     quiet: Quiet = False,
@@ -55,6 +54,7 @@ def command(
     from dmpcli.records import streams
     from dmpcli.records import tool as tool_file
 
+    every, count = settings.every, settings.count
     _check(pairs, angles, part, every, count)
     repeatable = workcell.repeatable(workcell.check(robot, None))
     streams.check_writable(output)
@@ -90,10 +90,6 @@ def _check(
         raise InputError("--part: points of a part are for register; leave --pairs out")
     if angles and not pairs:
         raise InputError("--angles: belongs to --pairs; points always have theirs")
-    if every is not None and not 0.0 < every <= 3600.0:
-        raise InputError(f"--every {every:g}: must be a time above 0 and up to 3600 s")
-    if count is not None and not 0 < count <= 100_000:
-        raise InputError(f"--count {count}: must be a number from 1 to 100000")
     if every is not None and count is None and part is None:
         raise InputError("--every: needs --count N, or it would never end")
 

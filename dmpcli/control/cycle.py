@@ -26,7 +26,7 @@ from dmpcli.control.settling import SettlingDetector
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
-from dmpcli.planning.limits import Box
+from dmpcli.settings.ranges import Box
 
 Pose = tuple[Floats, Floats]
 

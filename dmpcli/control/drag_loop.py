@@ -22,7 +22,6 @@ from dmpcli.control.cycle import Pose as Led
 from dmpcli.control.demonstration_log import DemonstrationLog
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.signals import Interruption
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import DmpError, InputError
 from dmpcli.instruments.protocols import (
     Clock,
@@ -36,6 +35,7 @@ from dmpcli.instruments.protocols import (
 from dmpcli.primitives.admittance import Pose, brake, move
 from dmpcli.primitives.compensation import Compensation, LowPass, dead_band
 from dmpcli.primitives.wrench import Tool
+from dmpcli.settings.record import RecordSettings
 
 STILL = 0.5
 """mm: a tool that stays within this of one point is at rest."""

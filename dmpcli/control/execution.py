@@ -19,6 +19,7 @@ from dmpcli.kinematics import models
 from dmpcli.measures.contact import contact
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
+from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan, Stroke
 from dmpcli.planning.preflight import Check
 from dmpcli.primitives.compensation import Compensation
@@ -27,8 +28,8 @@ from dmpcli.primitives.reach import Reach
 from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.simulation.mock import Plate, Scene
-from dmpcli.streaming.settings import COUPLED, ExecuteSettings
 
 SENSOR_RATE = 100.0
 # A zero is taken over this time, s.
@@ -89,7 +90,7 @@ def prepare(
         stroke,
         settings.period,
         settings.speed,
-        settings.limits,
+        limits_of(settings),
         start,
         settings.approach or settings.lead_speed,
     )
@@ -132,9 +133,9 @@ def judge(
     array, shape (6,), or None
         Joint angles after, rad.
     """
-    s = settings
-    checks = preflight.at_rest(stroke, s.speed, s.period, s.limits) + near
-    checks += preflight.within_limits(plan, stroke, s.limits)
+    limits = limits_of(settings)
+    checks = preflight.at_rest(stroke, settings.speed, settings.period, limits) + near
+    checks += preflight.within_limits(plan, stroke, limits)
     if reach is None:
         return checks, None
     by_joints, joints = preflight.by_joints(plan, stroke, reach, joints)

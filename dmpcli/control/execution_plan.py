@@ -11,11 +11,12 @@ from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection, listed
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import transfers
+from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
 from dmpcli.primitives.reach import Reach
-from dmpcli.streaming.settings import ExecuteSettings
+from dmpcli.settings.execute import ExecuteSettings
 
 CLEARANCE = 20.0
 """Distance from the work in the air where none is given, mm."""
@@ -119,7 +120,7 @@ def prepare(
         return [CheckedPlan(*execution.prepare(strokes[0], settings, state, reach))]
     between = ways(settings, arm.info.lookahead, presses)
     guards.check_ready(state)
-    start, limits = (state.position, state.rotation), settings.limits
+    start, limits = (state.position, state.rotation), limits_of(settings)
     standing = execution.standing(strokes[0], settings, state)
     near = all(check.passed for check in standing)
     if settings.approach is None:

@@ -12,7 +12,7 @@ import numpy as np
 from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
-from dmpcli.planning.limits import Box
+from dmpcli.settings.ranges import Box
 
 LAG = 0.1
 """The actual pose may lag the set-points by this much more than the look-ahead, s."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-Box = tuple[float, float, float, float, float, float]
-"""xmin, xmax, ymin, ymax, zmin, zmax, mm, base frame."""
+from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.settings.ranges import Box
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class Limits:
     workspace: Box | None = None
 
 
-def ordered(box: Box) -> Box:
-    """Return a workspace whose minima lie below its maxima.
-
-    Raises
-    ------
-    ValueError
-        They do not.
-    """
-    if not all(low < high for low, high in zip(box[::2], box[1::2], strict=True)):
-        raise ValueError("each minimum of the workspace must lie below its maximum")
-    return box
+def limits_of(settings: ExecuteSettings) -> Limits:
+    """Return the limits that the settings of a run state."""
+    return Limits(
+        settings.max_speed,
+        settings.max_acceleration,
+        settings.max_jerk,
+        settings.max_rotation_speed,
+        settings.max_rotation_acceleration,
+        settings.max_rotation_jerk,
+        settings.workspace,
+    )

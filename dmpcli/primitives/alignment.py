@@ -6,7 +6,6 @@ differ (`registration`). A rest that fewer than half of the demonstrations have 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from dmpcli.errors import InputError
 from dmpcli.primitives import agreement, pauses, registration
 from dmpcli.primitives.agreement import Doubt
 from dmpcli.primitives.arc_length import Law
+from dmpcli.primitives.choices import Align
 from dmpcli.primitives.common_law import mean_law, running_on
 from dmpcli.primitives.demonstrations import (
     Demonstration,
@@ -26,8 +26,6 @@ from dmpcli.primitives.demonstrations import (
 )
 from dmpcli.primitives.registration import Correspondence
 from dmpcli.primitives.retiming import eased
-
-How = Literal["none", "time", "path"]
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ class Alignment:
         By how much correspondence differs from arc length, largest, as a part of the length.
     """
 
-    how: How
+    how: Align
     duration: float
     tracks: tuple[Track, ...]
     x: Floats
@@ -134,7 +132,7 @@ class Alignment:
 
 
 def align(
-    demonstrations: Sequence[Demonstration], how: How = "path", samples: int | None = None
+    demonstrations: Sequence[Demonstration], how: Align = "path", samples: int | None = None
 ) -> Alignment:
     """Bring demonstrations to a common time.
 
@@ -281,7 +279,7 @@ def _compared(
 
 
 def _measured(
-    how: How,
+    how: Align,
     duration: float,
     demonstrations: Sequence[Demonstration],
     tracks: Sequence[Track],

@@ -13,14 +13,14 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.measures.wave import LINE, wave_heights
 from dmpcli.primitives import end_conditions
+from dmpcli.primitives.choices import MOST, Method, WidthRule
 from dmpcli.primitives.curve import Curve
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.forced_model import forced_model
-from dmpcli.primitives.phase import Basis, WidthRule
-from dmpcli.primitives.regression import Method, target_forcing
+from dmpcli.primitives.phase import Basis
+from dmpcli.primitives.regression import target_forcing
 
 FIRST = 80
-MOST = 2000
 PASSES = 3
 # Largest deviation, in tolerances.
 LARGEST = 4.0

@@ -1,13 +1,30 @@
-"""How to learn a skill: what the presets and the options of `fit` name."""
+"""What one may choose of how a skill is learned and drawn, and how it is learned by default.
+
+Nothing else is loaded here: the command line completes and explains these words.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from dmpcli.primitives.phase import WidthRule
-from dmpcli.primitives.regression import Method
-from dmpcli.primitives.skill import ForcingScale, Learning, Model
-
+Model = Literal["modified", "original"]
+Learning = Literal["tolerance", "paper"]
+ForcingScale = Literal["axis", "distance"]
+Method = Literal["lwr", "ridge"]
+WidthRule = Literal["spacing", "power"]
 Align = Literal["none", "time", "path"]
+Amplitude = Literal["keep", "scale"]
+Orientation = Literal["keep", "surface"]
+OnBorder = Literal["fail", "clip", "skip", "split"]
+
+MOST = 2000
+"""Largest N."""
+
+ACCELERATION = 1000.0
+"""Default of a tool's largest acceleration, mm/s²: less than half of what `execute` lets an arm
+have."""
+
+CONDITION = 10.0
+"""Condition number above which a set of poses is refused; 12 well spread ones have about 2."""
 
 TOLERANCE = 0.1
 """Largest RMS deviation of a skill from what was demonstrated, mm ..."""

@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.primitives.choices import Amplitude, Orientation
 from dmpcli.primitives.contact_heights import ContactHeights
-from dmpcli.primitives.generalization import Amplitude, Orientation
 from dmpcli.primitives.inclination import Inclination
 from dmpcli.primitives.retiming import Timing
 from dmpcli.primitives.tool_speed import Pace

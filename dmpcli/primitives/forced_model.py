@@ -12,8 +12,9 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.primitives import dynamics, end_conditions
+from dmpcli.primitives.choices import WidthRule
 from dmpcli.primitives.dynamics import Spring
-from dmpcli.primitives.phase import Basis, WidthRule, even_in_time, phase
+from dmpcli.primitives.phase import Basis, even_in_time, phase
 from dmpcli.primitives.regression import BandedRegression
 
 if TYPE_CHECKING:

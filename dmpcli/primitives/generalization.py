@@ -1,22 +1,19 @@
 """Carrying a skill to new start-goal pairs: the roll-out of eq. (9)-(11), all pairs at once."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from dmpcli import rotations
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import RefusedError
+from dmpcli.primitives.choices import Amplitude, Orientation
 from dmpcli.primitives.contact_heights import ContactHeights
 from dmpcli.primitives.inclination import Inclination, inclined
 from dmpcli.primitives.skill import Skill
 from dmpcli.surfaces.orientation import smoothed
 from dmpcli.surfaces.plane import PlaneCharts
 from dmpcli.surfaces.protocol import Charts, Lift
-
-Amplitude = Literal["keep", "scale"]
-Orientation = Literal["keep", "surface"]
 
 # Rows of the matrix that every roll-out is a product with: a, b and the six forced responses.
 _START, _GOAL, _FORCED = 0, 1, 2

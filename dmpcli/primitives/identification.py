@@ -22,13 +22,11 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import RefusedError
 from dmpcli.primitives import wrench
+from dmpcli.primitives.choices import CONDITION
 from dmpcli.rotations import log, skew
 
 FEWEST = 3
 """Orientations about different axes that the six unknowns of either system need."""
-
-CONDITION = 10.0
-"""Condition number above which a set of poses is refused; 12 well spread ones have about 2."""
 
 SAME = 0.02
 """Orientations nearer to each other than this, rad, count as one."""

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.primitives.choices import PAPER_BASIS, Choices
+from dmpcli.primitives.choices import PAPER_BASIS, Choices, Model
 from dmpcli.primitives.dynamics import Spring, critical
 from dmpcli.primitives.fit_result import Fit, Reproduction
 from dmpcli.primitives.phase import even_in_time, phase
 from dmpcli.primitives.preparation import Prepared, check_alike, prepare
 from dmpcli.primitives.regression import METHODS, target_forcing
-from dmpcli.primitives.skill import Model, Response, Skill
+from dmpcli.primitives.skill import Response, Skill
 from dmpcli.primitives.smoothing import Signal, Stroke
 
 # An axis whose |g - x0| is below this part of the stroke's extent cannot carry the factor of (7).

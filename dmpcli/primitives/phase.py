@@ -2,20 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.primitives.choices import WidthRule
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 # exp(-60) is 1e-26: ten orders below rounding, and weights differ by far less than that.
 _LEAST_EXPONENT = -60.0
-
-WidthRule = Literal["spacing", "power"]
 
 
 def phase(t: Floats, tau: float, alpha_1: float) -> Floats:

@@ -1,15 +1,13 @@
 """Weights of the forcing term from its samples."""
 
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.primitives.choices import Method
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.phase import Basis, Window, significant_exp
-
-Method = Literal["lwr", "ridge"]
 
 # Relative to the mean diagonal of the normal equations: enough to make them definite.
 _RIDGE = 1e-12

@@ -2,18 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.primitives import dynamics
+from dmpcli.primitives.choices import ForcingScale, Learning, Model
 from dmpcli.primitives.dynamics import Spring
 from dmpcli.primitives.phase import Basis, phase
-
-Model = Literal["modified", "original"]
-Learning = Literal["tolerance", "paper"]
-ForcingScale = Literal["axis", "distance"]
 
 
 @dataclass(frozen=True)

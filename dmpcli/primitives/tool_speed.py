@@ -15,9 +15,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.primitives.arc_length import monotone
-
-ACCELERATION = 1000.0
-"""Default of the largest acceleration, mm/s²: less than half of what `execute` lets an arm have."""
+from dmpcli.primitives.choices import ACCELERATION
 
 HELD = 0.05
 """Part of a speed that it may be missed by, where it counts as held."""

@@ -11,8 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dmpcli.errors import InputError
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.skill import Learning, Model
+from dmpcli.primitives.choices import Choices, Learning, Model
 from dmpcli.records.skill import SkillFile
 
 FACT = "taught"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.drag.settings import RecordSettings
+from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation.reference_strokes import Reference
 
 _TABLE_RATE = 200.0

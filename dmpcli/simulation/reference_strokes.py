@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import InputError
 from dmpcli.primitives import references
 from dmpcli.records import streams
 from dmpcli.records.streams import Source
+from dmpcli.settings.record import RecordSettings
 
 AXES = ("x", "y", "z")
 SHAPES = ("sine", "line", "circle")

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import InputError
+from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation.hand import HandParameters, SimulatedHand, stroke_time
 from dmpcli.simulation.mock import Lab, Plate, Scene
 from dmpcli.simulation.reference_strokes import DURATION, Reference

@@ -1,8 +1,7 @@
 """How ``generalize`` draws a table of pairs: the run, and what it tells."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from dmpcli.batch.job import Job
 from dmpcli.batch.run import Batch, Shard, Summary
@@ -14,52 +13,15 @@ from dmpcli.primitives.drawing import draw, seen_from
 from dmpcli.records import streams, trajectory
 from dmpcli.records.pairs import OK, PairTable
 from dmpcli.records.record import Form
+from dmpcli.settings.batch import BatchOptions
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import SLOW, SPLIT
 
 SHOWN = 20
 """Bad pairs that are named on the terminal; all are in the folder's table."""
 
-PAIRS_PER_PART = 2000
 
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the command line says of a batch.
-
-    Attributes
-    ----------
-    stop : bool
-        Whether a bad pair ends the batch, else it is skipped.
-    jobs : int
-    cluster : str or None
-    shard : tuple of int
-        Which share, from 1, of how many.
-    pairs_per_part : int
-    float32 : bool
-    compression : str
-    """
-
-    stop: bool = True
-    jobs: int = 1
-    cluster: str | None = None
-    shard: tuple[int, int] = (1, 1)
-    pairs_per_part: int = PAIRS_PER_PART
-    float32: bool = False
-    compression: str = "zstd"
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """The options that change the result; who draws, and in how many shares, does not."""
-        return {
-            "on_error": "stop" if self.stop else "skip",
-            "pairs_per_part": self.pairs_per_part,
-            "float32": self.float32,
-            "compression": self.compression,
-        }
-
-
-def write(ready: Ready, output: Path, wanted: Wanted) -> None:
+def write(ready: Ready, output: Path, wanted: BatchOptions) -> None:
     """Draw the batch into a folder and say what became of it."""
     task, table, duration = ready.task, ready.table, ready.duration
     if not table.good.any():
@@ -71,7 +33,7 @@ def write(ready: Ready, output: Path, wanted: Wanted) -> None:
     form = Form(wanted.float32, wanted.compression)
     job = Job(task, wanted.stop, replace(ready.provenance, facts=facts), form, str(output))
     pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
-    shard = Shard(*wanted.shard)
+    shard = Shard(*wanted.share)
     batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, shard)
     draw_with = _workers(wanted)
     first = table.good.nonzero()[0][:1]
@@ -83,7 +45,7 @@ def write(ready: Ready, output: Path, wanted: Wanted) -> None:
     _tell(table, output, shard, summary)
 
 
-def _workers(wanted: Wanted) -> Draw:
+def _workers(wanted: BatchOptions) -> Draw:
     from dmpcli.batch import workers
 
     if wanted.cluster is not None:

@@ -10,11 +10,11 @@ from dmpcli.primitives.learning import fit
 from dmpcli.primitives.skill import TaughtSurface
 from dmpcli.primitives.smoothing import Stroke
 from dmpcli.records import learned_skill, skill
-from dmpcli.records.fit_settings import FitSettings
 from dmpcli.records.layouts import Layout
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance
 from dmpcli.records.streams import Source
+from dmpcli.settings.fit import FitSettings
 from dmpcli.workflows.fit_messages import cautions
 from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -66,7 +66,7 @@ def learn(
     InputError, RefusedError
         The recordings cannot be learned so.
     """
-    options = settings.model_dump()
+    options = settings.as_options()
     if form is not None:
         options["layout"] = form.as_options()
     inputs = [{"role": "demonstration", "sha256": source.sha256} for source in sources]

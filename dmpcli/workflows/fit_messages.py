@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dmpcli.errors import counted
-from dmpcli.primitives.basis_search import MOST
+from dmpcli.primitives.choices import MOST
 from dmpcli.primitives.stroke_plane import LEANING
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from dmpcli.primitives.admission import admit
 from dmpcli.primitives.drawn_strokes import OnBorder, Style
 from dmpcli.primitives.skill import Skill
 from dmpcli.records import lesson
-from dmpcli.records.generalize_settings import GeneralizeSettings
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
+from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.surfaces.protocol import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
@@ -106,7 +106,7 @@ def prepared(order: Order) -> Ready:
         The skill cannot give what is asked, or a pair cannot be drawn and `Order.stop` holds.
     """
     skill, settings, read = order.skill, order.settings, order.surface
-    options = settings.asked(settings.model_dump()) | order.options
+    options = settings.as_options() | order.options
     inputs = [{"role": "skill", "sha256": skill.sha256}]
     if read is not None:
         options |= {"surface_unit": read.unit, "on_border": order.on_border} | read.options

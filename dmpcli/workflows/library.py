@@ -17,12 +17,14 @@ from dmpcli.primitives.drawn_strokes import OnBorder
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.primitives.skill import Skill
 from dmpcli.records import learned_skill, record, recordings, schemas, streams
-from dmpcli.records.fit_settings import FitSettings
-from dmpcli.records.generalize_settings import GeneralizeSettings
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import FARTHEST, OK, PairTable
-from dmpcli.records.settings import resolve
 from dmpcli.rotations import to_euler
+from dmpcli.settings.batch import BatchOptions
+from dmpcli.settings.fit import FitSettings
+from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.settings.layers import resolve
+from dmpcli.settings.options import Given
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.protocol import Surface
 from dmpcli.workflows import batches, process, single, surface_input, values
@@ -93,7 +95,7 @@ def write(value: Any, path: str | Path) -> None:
     if isinstance(value, TrajectoryBatch):
         if value.ready is None:
             raise InputError(f"{path}: this batch was read from a folder; copy that one")
-        batches.write(value.ready, Path(path), batches.Wanted(stop=False))
+        batches.write(value.ready, Path(path), BatchOptions(on_error="skip"))
         return
     if isinstance(value, LearnedSkill):
         content = value.content
@@ -161,7 +163,7 @@ def fit(
     if not several:
         raise InputError("there is no demonstration to learn from; give at least one")
     check_said(settings, surface is not None)
-    resolved = resolve(FitSettings, "fit", settings, preset)
+    resolved = resolve(FitSettings, settings, preset)
     files = [one.file() for one in several]
     forms = [one.layout for one in several]
     strokes = [recordings.read(file, form).stroke for file, form in zip(files, forms, strict=True)]
@@ -212,10 +214,10 @@ def generalize(
     InputError, RefusedError
         As ``dmpcli generalize``; of a pair among many its status says it.
     """
-    resolved = resolve(GeneralizeSettings, "generalize", settings, preset)
+    resolved = resolve(GeneralizeSettings, settings, preset)
     lines = None if keep_out is None else Path(keep_out)
     named = _named(surface)
-    process.check(resolved, settings.get("orientation"), _path_of(named), lines)
+    process.check(resolved, Given(settings), _path_of(named), lines)
     first, last = _points("start", start), _points("goal", goal)
     if first.shape != last.shape:
         raise InputError(f"start and goal: shapes {first.shape} and {last.shape} differ")
@@ -235,7 +237,7 @@ def generalize(
         ids = [str(i + 1) for i in range(count)]
         pairs = Pairs(first, last, *rotations)
         table = PairTable(MANY, ids, pairs, None, np.full(count, np.nan), [OK] * count)
-        options = batches.Wanted(stop=False).options
+        options = BatchOptions(on_error="skip").as_options()
     order = Order(
         skill,
         table,

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
     from dmpcli.primitives.drawn_strokes import OnBorder, Stroke, Style
     from dmpcli.primitives.skill import Skill
-    from dmpcli.records.generalize_settings import GeneralizeSettings
     from dmpcli.records.pairs import PairTable
+    from dmpcli.settings.generalize import GeneralizeSettings
+    from dmpcli.settings.options import Given
     from dmpcli.surfaces.border_margin import BorderMargin
     from dmpcli.surfaces.keep_off import Region
     from dmpcli.surfaces.protocol import Surface
@@ -25,28 +26,9 @@ _OFF = 1.0
 """How far the points of a line may lie off the surface, mm, unless --snap-tol says more."""
 
 
-def leaving(on_border: str) -> "OnBorder":
-    """Return what becomes of a stroke that leaves the surface.
-
-    Raises
-    ------
-    InputError
-        There is no such choice.
-    """
-    from typing import get_args
-
-    from dmpcli.primitives.drawn_strokes import OnBorder
-
-    for choice in get_args(OnBorder):
-        if on_border == choice:
-            found: OnBorder = choice
-            return found
-    raise InputError(f"--on-border {on_border}: must be fail, clip, skip or split")
-
-
 def check(
     settings: "GeneralizeSettings",
-    orientation: str | None,
+    given: "Given",
     surface: Path | None,
     keep_out: Path | None,
 ) -> None:
@@ -55,8 +37,8 @@ def check(
     Parameters
     ----------
     settings : GeneralizeSettings
-    orientation : str or None
-        As the command line gives it.
+    given : dict
+        What the command line itself says of them.
     surface, keep_out : Path or None
 
     Raises
@@ -64,7 +46,7 @@ def check(
     InputError
         Names the options.
     """
-    if settings.inclination is not None and orientation == "keep":
+    if settings.inclination is not None and given.get("orientation") == "keep":
         raise InputError(
             "--lead and --tilt lean the tool off the surface's normal, with which --orientation "
             "keep does not turn it; leave it out"

@@ -3,7 +3,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dmpcli.calibration.orientations import around
-from dmpcli.primitives.identification import CONDITION, check_orientations, condition
+from dmpcli.primitives.choices import CONDITION
+from dmpcli.primitives.identification import check_orientations, condition
 
 HOME = Rotation.from_euler("xyz", [170, 5, -30], degrees=True).as_matrix()
 

@@ -5,7 +5,6 @@ import pytest
 
 from dmpcli.calibration import result
 from dmpcli.calibration.orientations import around
-from dmpcli.calibration.settings import CalibrateSettings
 from dmpcli.calibration.tour import Interrupted, Tour
 from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.force_sensing import Sensing
@@ -16,6 +15,7 @@ from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
 from dmpcli.primitives.compensation import Compensation
 from dmpcli.primitives.reach import Reach
+from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Scene
 from dmpcli.simulation.mock.parameters import Faults, ServoParameters
 

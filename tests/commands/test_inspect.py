@@ -66,9 +66,9 @@ def test_standard_input_is_read(tmp_path):
 
 
 def test_presets_tell_their_sections_and_units():
-    from dmpcli.records import settings
+    from dmpcli.settings import layers
 
-    folder = settings.resources.files("dmpcli") / "presets"
+    folder = layers.resources.files("dmpcli") / "presets"
     told = found(folder / "paper.toml")
     assert told["schema"] == "preset"
     assert told["content"]["[units] length"] == "mm"

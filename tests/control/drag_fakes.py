@@ -7,16 +7,16 @@ import numpy as np
 
 from dmpcli.control import workcell
 from dmpcli.control.drag_loop import Recorder
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo, ServoInfo
-from dmpcli.records import settings as layers
+from dmpcli.settings import layers
+from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN, PEN_DOWN
 
 
 def drag_settings(**options):
-    return layers.resolve(RecordSettings, "record", options, "drag")
+    return layers.resolve(RecordSettings, options, "drag")
 
 
 def rehearse(robot="mock:", sensor="mock:", **options):

@@ -9,7 +9,7 @@ from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning.plan import Stroke
 from dmpcli.planning.preflight import Check
-from dmpcli.streaming.settings import ExecuteSettings
+from dmpcli.settings.execute import ExecuteSettings
 from tests.control.streaming_fakes import plan, stroke
 
 

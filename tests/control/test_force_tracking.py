@@ -10,7 +10,7 @@ from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
 from dmpcli.primitives import admittance
 from dmpcli.primitives.coupling import Law, fast_filter
 from dmpcli.rotations import from_euler
-from dmpcli.streaming.settings import ExecuteSettings
+from dmpcli.settings.execute import ExecuteSettings
 from tests.control.streaming_fakes import START, plan, stroke
 
 PERIOD = 0.02

@@ -14,8 +14,8 @@ from dmpcli.kinematics import chain, inverse, models
 from dmpcli.planning import preflight
 from dmpcli.planning.plan import Stroke
 from dmpcli.primitives.reach import Reach
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.simulation.mock import Lab, MockServo
-from dmpcli.streaming.settings import ExecuteSettings
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 
 EC66 = models.model("ec66")

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
-from dmpcli.records import pairs, settings
-from dmpcli.records.fit_settings import FitSettings
-from dmpcli.records.generalize_settings import GeneralizeSettings
-from dmpcli.records.settings import resolve
+from dmpcli.records import pairs
 from dmpcli.records.streams import Source
+from dmpcli.settings import layers
+from dmpcli.settings.fit import FitSettings
+from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.settings.layers import resolve
 
 HEADER = "x0,y0,z0,xg,yg,zg"
 
@@ -76,13 +77,13 @@ def test_a_table_that_is_no_table_of_pairs_is_refused(source, message):
 
 def test_options_beat_config_which_beats_the_preset(tmp_path):
     (tmp_path / "c.toml").write_text("[fit]\nbasis = 40\nalpha_1 = 2.0\n")
-    found = resolve(FitSettings, "fit", {"basis": 20, "tau": None}, "paper", tmp_path / "c.toml")
+    found = resolve(FitSettings, {"basis": 20, "tau": None}, "paper", tmp_path / "c.toml")
     assert (found.basis, found.alpha_1, found.widths) == (20, 2.0, "power")
 
 
 def test_the_presets_of_the_package_are_whole():
-    assert settings.preset_names() == ["default", "drag", "paper"]
-    assert resolve(FitSettings, "fit", {}, "default") == FitSettings()
+    assert layers.preset_names() == ["default", "drag", "paper"]
+    assert resolve(FitSettings, {}, "default") == FitSettings()
 
 
 @pytest.mark.parametrize(
@@ -102,20 +103,20 @@ def test_a_wrong_preset_is_refused_by_name(tmp_path, monkeypatch, text, message)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.toml").write_text(text)
     with pytest.raises(InputError, match=message):
-        resolve(FitSettings, "fit", {}, "p.toml")
+        resolve(FitSettings, {}, "p.toml")
 
 
 def test_unknown_presets_and_missing_files_are_refused():
     with pytest.raises(InputError, match="no such preset; there are default, drag, paper"):
-        resolve(FitSettings, "fit", {}, "fast")
+        resolve(FitSettings, {}, "fast")
     with pytest.raises(InputError, match="no such file"):
-        resolve(FitSettings, "fit", {}, "none.toml")
+        resolve(FitSettings, {}, "none.toml")
 
 
 @given(st.sampled_from(["duration", "rate", "ease_in", "snap_tol"]), st.floats())
 def test_every_number_is_taken_or_refused_by_its_option(name, value):
     try:
-        found = resolve(GeneralizeSettings, "generalize", {name: value})
+        found = resolve(GeneralizeSettings, {name: value})
         assert np.isfinite(getattr(found, name))
     except InputError as error:
         assert str(error).startswith(f"--{name.replace('_', '-')} = ")

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.drag.settings import RecordSettings
 from dmpcli.errors import InputError
 from dmpcli.records.streams import Source
+from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes
 
 

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dmpcli.drag import settings as record_settings
 from scipy.spatial import cKDTree
 
 from dmpcli.control.drag_loop import Recorder
-from dmpcli.drag import settings as record_settings
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.measures.motion import log_dimensionless_jerk, spectral_arc_length
@@ -206,6 +206,6 @@ def test_settings_that_do_not_go_together_are_refused_by_name(options, words):
 
 @pytest.mark.parametrize("preset", ["drag", "paper"])
 def test_the_presets_are_stable(preset):
-    from dmpcli.records import settings as layers
+    from dmpcli.settings import layers
 
     record_settings.check(layers.resolve(record_settings.RecordSettings, "record", {}, preset))

@@ -9,27 +9,22 @@ import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ConfigDict, ValidationError
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dmpcli.errors import InputError
+from dmpcli.settings.model import Settings, number, settings_of
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 UNITS = {"length": "mm", "angle": "rad", "time": "s", "force": "N", "torque": "N·m"}
 
 
-class Settings(BaseModel):
-    """Base of every command's settings: unknown keys, NaN and infinity are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-S = TypeVar("S", bound=BaseModel)
+S = TypeVar("S", bound=Settings)
 
 
 def resolve(
     kind: type[S],
-    section: str,
     options: Mapping[str, Any],
     preset: str | None = None,
     config: Path | None = None,
@@ -40,8 +35,6 @@ def resolve(
     ----------
     kind : type
         The settings model; its defaults hold where nothing else is said.
-    section : str
-        The TOML section, which is the command's name.
     options : mapping
         Command-line options by field name; None means not given.
     preset : str, optional
@@ -55,21 +48,21 @@ def resolve(
         A file is missing or is not TOML, states other units, lacks the section, names an unknown
         key, or a value is of the wrong type, out of range, NaN or infinite.
     """
+    from pydantic import TypeAdapter, ValidationError
+
     merged: dict[str, Any] = {}
     origin: dict[str, str] = {}
     for label, values in (
-        *([_preset(preset, section)] if preset else []),
-        *([_toml_section(str(config), _read(config), section)] if config else []),
+        *([_preset(preset, kind.section)] if preset else []),
+        *([_toml_section(str(config), _read(config), kind.section)] if config else []),
     ):
         merged |= values
         origin |= dict.fromkeys(values, label)
     given = {key: value for key, value in options.items() if value is not None}
-    merged |= given
-    origin |= dict.fromkeys(given, "command line")
     try:
-        return kind.model_validate(merged)
+        return TypeAdapter(kind).validate_python(merged | given)
     except ValidationError as error:
-        raise InputError(_first(error, section, origin)) from None
+        raise InputError(_first(error, kind, given, origin)) from None
 
 
 def preset_names() -> list[str]:
@@ -121,25 +114,38 @@ def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, A
     return label, dict(document[section])
 
 
-def _first(error: ValidationError, section: str, origin: Mapping[str, str]) -> str:
+def _first(
+    error: "ValidationError",
+    kind: type[Settings],
+    options: Mapping[str, Any],
+    origin: Mapping[str, str],
+) -> str:
     """One line for the first thing wrong, naming where it was said."""
     detail = error.errors()[0]
     message = detail["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     if not detail["loc"]:  # settings that fit their ranges but not each other
-        return f"[{section}] {message}"
+        return f"[{kind.section}] {message}" if kind.section else message
     first, *rest = detail["loc"]
-    where = origin.get(str(first), "defaults")
-    # Of a choice between types pydantic also names the type that it tried.
-    places = [part for part in rest if isinstance(part, int) and where != "command line"]
-    name = str(first) + "".join(f"[{part}]" for part in places)
+    if first in options:
+        return _of_option(kind, str(first), detail["input"], message)
+    where, shown = origin.get(str(first), "defaults"), f"[{kind.section}] {first}"
     if detail["type"] == "missing":
         if rest:
-            return f"{where}: [{section}] {first}: has too few entries, [{rest[0]}] is missing"
-        return f"[{section}] {first}: is not set; give a preset that sets it"
-    shown = f"--{name.replace('_', '-')}" if where == "command line" else f"[{section}] {name}"
-    given = "" if detail["type"] == "extra_forbidden" else f" = {detail['input']!r}"
-    prefix = "" if where == "command line" else f"{where}: "
-    if detail["type"] == "extra_forbidden":
-        return f"{prefix}{shown}: no such setting"
-    return f"{prefix}{shown}{given}: {message}"
+            return f"{where}: {shown}: has too few entries, [{rest[0]}] is missing"
+        return f"{shown}: is not set; give a preset that sets it"
+    # Of a choice between types pydantic also names the type that it tried.
+    shown = f"{where}: {shown}" + "".join(f"[{part}]" for part in rest if isinstance(part, int))
+    if detail["type"] == "unexpected_keyword_argument":
+        return f"{shown}: no such setting"
+    return f"{shown} = {detail['input']!r}: {message}"
+
+
+def _of_option(kind: type[Settings], name: str, value: Any, message: str) -> str:
+    """Say what an option must be; one that is also a TOML key as it would be written there."""
+    setting = next(one for one in settings_of(kind) if one.name == name)
+    if setting.option is not None and setting.option.factor != 1.0:
+        value /= setting.option.factor
+    shown = number(value) if isinstance(value, float) else value
+    given = f" = {value!r}" if kind.section else f" {shown}"
+    return f"{setting.flag}{given}: " + (f"must be {setting.range}" if setting.range else message)
