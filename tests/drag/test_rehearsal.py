@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from dmpcli.drag import settings as record_settings
 from dmpcli.drag.loop import Recorder
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.mock import PEN, Lab, MockSensor, MockServo, Plate, Scene
 from dmpcli.measures.smoothness import log_dimensionless_jerk, spectral_arc_length
 from dmpcli.measures.wave import stroke_wave
+from dmpcli.settings import record as record_settings
 from tests.drag.drag_fakes import drag_settings, positions, rehearse
 
 # The zero takes 0.5 s; then the hand sets the pen down within 1 s.
@@ -203,4 +203,4 @@ def test_settings_that_do_not_go_together_are_refused_by_name(options, words):
 def test_the_presets_are_stable(preset):
     from dmpcli.settings import layers
 
-    record_settings.check(layers.resolve(record_settings.RecordSettings, "record", {}, preset))
+    record_settings.check(layers.resolve(record_settings.RecordSettings, {}, preset))
