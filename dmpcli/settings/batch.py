@@ -41,22 +41,24 @@ class BatchOptions(Settings):
         """Whether a bad pair ends the batch, else it is skipped."""
         return self.on_error == "stop"
 
+    def __post_init__(self) -> None:
+        """Refuse a share that there is not."""
+        _share(self.shard)
+
     @property
     def share(self) -> tuple[int, int]:
-        """Which share, from 1, of how many.
-
-        Raises
-        ------
-        InputError
-            There is no such share.
-        """
-        found = re.fullmatch(r"(\d{1,7})/(\d{1,7})", self.shard)
-        index, count = (int(found[1]), int(found[2])) if found else (0, 0)
-        if not 1 <= index <= count <= _MOST_SHARDS:
-            raise InputError(f"--shard {self.shard}: must be I/N with I from 1 to N, as in 3/8")
-        return index, count
+        """Which share, from 1, of how many."""
+        return _share(self.shard)
 
     def as_options(self) -> dict[str, Any]:
         """Return what changes the result; who draws, and in how many shares, does not."""
         said = super().as_options()
         return {key: said[key] for key in ("on_error", "pairs_per_part", "float32", "compression")}
+
+
+def _share(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text)
+    index, count = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= index <= count <= _MOST_SHARDS:
+        raise InputError(f"--shard {text}: must be I/N with I from 1 to N, as in 3/8")
+    return index, count

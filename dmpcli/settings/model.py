@@ -5,8 +5,8 @@ A model is a frozen dataclass; the annotation of a field holds everything there 
     rate: Annotated[float, Ge(0.001), Le(10_000), Option("Samples per second.", "Hz")] = 50.0
 
 pydantic reads type and range when values are checked (`layers`), the command line reads all of it
-(`options`). A field without `Option` is a key of the TOML section alone. Only the standard library
-is loaded here, so that ``--help`` and completion need not wait.
+(`options`). A field without `Option` is a key of the TOML section alone. No numerics are loaded
+here, so that ``--help`` and completion need not wait.
 """
 
 import types

@@ -74,7 +74,11 @@ class RecordSettings(Settings):
         float | None,
         Ge(0.1),
         Le(3600),
-        Option("From the first rest to the last.", "s", unset="as long as the hand takes"),
+        Option(
+            "How long, with the rests of the mock's hand; then it ends.",
+            "s",
+            unset="until asked, or the mock's hand is done",
+        ),
     ] = None
     until_rest: Annotated[
         float | None,

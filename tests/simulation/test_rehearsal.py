@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dmpcli.drag import settings as record_settings
 from scipy.spatial import cKDTree
 
 from dmpcli.control.drag_loop import Recorder
@@ -10,6 +9,7 @@ from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.measures.motion import log_dimensionless_jerk, spectral_arc_length
 from dmpcli.measures.wave import stroke_wave
+from dmpcli.settings import record as record_settings
 from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Plate, Scene
 from tests.control.drag_fakes import drag_settings, positions, rehearse
 
@@ -208,4 +208,4 @@ def test_settings_that_do_not_go_together_are_refused_by_name(options, words):
 def test_the_presets_are_stable(preset):
     from dmpcli.settings import layers
 
-    record_settings.check(layers.resolve(record_settings.RecordSettings, "record", {}, preset))
+    record_settings.check(layers.resolve(record_settings.RecordSettings, {}, preset))
