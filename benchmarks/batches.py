@@ -30,18 +30,18 @@ from benchmarks.surfaces import FACES
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
 from dmpcli.batch.job import Task
-from dmpcli.commands.batches import PAIRS_PER_PART
 from dmpcli.primitives.drawing import draw_blocks
 from dmpcli.primitives.drawn_strokes import Style
 from dmpcli.primitives.generalization import Pairs
 from dmpcli.records import skill as skill_file
 from dmpcli.records import streams
+from dmpcli.settings.batch import BatchOptions
 from dmpcli.surfaces.mesh import Mesh
 from tests.surfaces import cases, fields
 
 HEADER = "x0,y0,z0,xg,yg,zg"
 FEW, MANY, MILLION = 20_000, 100_000, 1_000_000
-FIRST = 2 * PAIRS_PER_PART
+FIRST = 2 * BatchOptions().pairs_per_part
 ROUNDS, GROWTH_TURNS = 4, 4
 PLATE = -17.5
 

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from dmpcli.commands import recording_options
 from dmpcli.commands.options import SURFACES, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell
@@ -48,6 +47,7 @@ def command(
     from dmpcli.workflows import surface_input
     from dmpcli.workflows.fit import check_said, learn
     from dmpcli.workflows.fit_messages import summary
+    from dmpcli.workflows.recording import recording
 
     check_said(given, surface is not None)
     surface_input.check_options(surface, surface_pose, surface_unit)
@@ -56,7 +56,7 @@ def command(
     if [str(path) for path in demonstrations].count(streams.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [streams.read(path) for path in demonstrations]
-    strokes = [recording_options.recording(source, layout) for source in sources]
+    strokes = [recording(source, layout) for source in sources]
     named = None
     if surface is not None:
         named = surface_input.read(surface, surface_pose, surface_unit, summary=True)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands import recording_options
 from dmpcli.commands.options import SURFACES, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
@@ -118,7 +117,9 @@ def _part(name: str, label: str, normal: "Floats | None", form: "Layout | None")
         return Part(label, source.sha256, skill.SCHEMA, pupil=pupil)
     found = record.decode(source) if record.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        recording = recording_options.recording(source, None if found else form)
+        from dmpcli.workflows.recording import recording as read_recording
+
+        recording = read_recording(source, None if found else form)
         kind = "recording" if found is None else "demonstration"
         recorded = Recorded(recording, label, source.name, source.sha256, normal)
         if found is not None:

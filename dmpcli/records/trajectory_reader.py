@@ -118,7 +118,7 @@ def _normals(record: Record, rows: Integers, facts: Mapping[str, Any]) -> Floats
 def unit_normals(
     name: str, normals: Floats | None, named: Floats | None, rows: Integers
 ) -> Floats | None:
-    """Return the unit normals of some rows, shape (n, 3), mm; None where nothing says them.
+    """Return the unit normals of some rows, shape (n, 3); None where nothing says them.
 
     Parameters
     ----------

@@ -25,6 +25,7 @@ from dmpcli.settings.fit import FitSettings
 from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.settings.layers import resolve
 from dmpcli.settings.options import Given
+from dmpcli.settings.recording import RecordingOptions
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.protocol import Surface
 from dmpcli.workflows import batches, process, single, surface_input, values
@@ -39,18 +40,16 @@ MANY = "start and goal"
 """What messages call a table of pairs that was given as arrays."""
 
 
-def read(path: str | Path, layout: str | None = None, **said: Any) -> Any:
+def read(path: str | Path, **said: Any) -> Any:
     """Read a file of dmpcli's, or a recording of another program.
 
     Parameters
     ----------
     path : str or Path
         A recording, skill, trajectory, run, or the folder of a batch.
-    layout : str, optional
-        Of another program's recording; see ``dmpcli fit --help``.
     **said
-        ``length, time, angle`` (units), ``rotation``, ``sample_rate``, ``body``, ``repeated``,
-        ``decimal``: as the options of ``fit``.
+        How another program's recording is read: the options of ``dmpcli fit``, with underscores,
+        as ``layout="ur"`` or ``length_unit="m"``.
 
     Returns
     -------
@@ -75,7 +74,7 @@ def read(path: str | Path, layout: str | None = None, **said: Any) -> Any:
             return Run(found.t, found.position(), found.rotation(), record=found)
         if found.schema is not schemas.DEMONSTRATION:
             raise InputError(f"{path}: is a {found.schema.name} file, which holds no stroke")
-    return values.demonstration(source, values.layout_of(layout, said))
+    return values.demonstration(source, resolve(RecordingOptions, said).as_layout())
 
 
 def write(value: Any, path: str | Path) -> None:
@@ -167,7 +166,13 @@ def fit(
     files = [one.file() for one in several]
     forms = [one.layout for one in several]
     strokes = [recordings.read(file, form).stroke for file, form in zip(files, forms, strict=True)]
-    skill, _ = learn(files, strokes, resolved, forms[0], _named(surface))
+    known = [form for form in forms if form is not None]
+    if any(form != known[0] for form in known):
+        raise InputError(
+            "the demonstrations were read in different ways, and a skill tells one; write each and "
+            "read it again"
+        )
+    skill, _ = learn(files, strokes, resolved, known[0] if known else None, _named(surface))
     return skill
 
 

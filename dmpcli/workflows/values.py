@@ -12,10 +12,9 @@ from dmpcli.errors import InputError, about
 from dmpcli.figures.recorded import Recorded
 from dmpcli.figures.stroke import Stroke
 from dmpcli.figures.strokes import strokes_of
-from dmpcli.messages import tell, warn
 from dmpcli.primitives.admission import snapped
 from dmpcli.primitives.drawing import draw
-from dmpcli.records import layouts, record, recordings, schemas, streams
+from dmpcli.records import record, recordings, schemas, streams
 from dmpcli.records.layouts import Layout
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Provenance, Record
@@ -24,6 +23,7 @@ from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, store
 from dmpcli.rotations import from_euler, to_euler
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows.generalize import Ready
+from dmpcli.workflows.recording import recording
 
 
 @dataclass(frozen=True)
@@ -101,31 +101,10 @@ class TrajectoryBatch(Trajectory):
         )
 
 
-def layout_of(name: str | None, said: dict[str, Any]) -> Layout | None:
-    """Return the layout that the words of `read` describe; None where they say nothing.
-
-    Raises
-    ------
-    InputError
-        There is no such layout.
-    """
-    if name is None and not said:
-        return None
-    if name is not None and name not in layouts.LAYOUTS:
-        raise InputError(f"--layout {name}: no such layout; there are {', '.join(layouts.LAYOUTS)}")
-    base = layouts.LAYOUTS[name] if name else Layout()
-    return layouts.adapted(base, [], said)
-
-
 def demonstration(source: Source, form: Layout | None) -> Demonstration:
     """Read a recording, and say how it was read and what is doubtful about it."""
-    found = recordings.read(source, form)
-    for remark in found.told:
-        tell(f"{source.name}: {remark}")
-    for doubt in found.doubts:
-        warn(f"{source.name}: {doubt}")
-    stroke = found.stroke
-    layout = None if found.ours else form
+    stroke = recording(source, form)
+    layout = None if record.is_ours(source) else form
     return Demonstration(stroke.t, stroke.position, stroke.rotation, source=source, layout=layout)
 
 
@@ -234,6 +213,8 @@ def record_of(one: Trajectory) -> Record:
     if isinstance(one, DrawnTrajectory | Run) and one.record is not None:
         return one.record
     columns = _columns(one)
+    if not len(columns["t"]):
+        raise InputError("a trajectory without samples: of a batch, its status says why")
     columns["id"] = np.array(["1"] * len(columns["t"]), dtype=object)
     if one.normal is not None:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))

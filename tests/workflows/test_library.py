@@ -182,3 +182,28 @@ def test_what_is_told_goes_to_the_logger(skill, caplog):
     finally:
         logger.propagate = before
     assert any("onto the surface" in line for line in caplog.messages)
+
+
+def test_a_recording_of_another_program_is_read_by_the_options_of_fit(tmp_path):
+    t = np.linspace(0.0, 4.0, 201)
+    rows = np.column_stack([t, 0.1 * t / 4.0, 0.01 * np.sin(np.pi * t), 0.0 * t])
+    text = "\n".join(",".join(f"{value:.9f}" for value in row) for row in rows)
+    path = tmp_path / "other.csv"
+    path.write_text("time,x,y,z\n" + text + "\n")
+    demo = dmpcli.read(path, length_unit="m", map_=("t=time",))
+    np.testing.assert_allclose(demo.position[-1], [100.0, 0.0, 0.0], atol=1e-6)
+    done = command("fit", path, "-o", tmp_path / "a.json", "--length-unit", "m", "--map", "t=time")
+    assert done.exit_code == 0, done.stderr
+    dmpcli.write(dmpcli.fit(demo), tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    with pytest.raises(dmpcli.InputError, match="--layout"):
+        dmpcli.read(path, layout="nobody")
+    with pytest.raises(dmpcli.InputError, match="in different ways"):
+        dmpcli.fit([demo, dmpcli.read(path, length_unit="cm", map_=("t=time",))])
+
+
+def test_what_of_a_batch_was_not_drawn_has_no_waves(skill):
+    many = dmpcli.generalize(skill, [START, START], [GOAL, START])
+    assert len(dmpcli.wave_heights(many[0])) >= 1
+    with pytest.raises(dmpcli.InputError, match="without samples"):
+        dmpcli.wave_heights(many[1])

@@ -1,0 +1,21 @@
+"""How a recording was read, told by all who take any."""
+
+from dmpcli.messages import tell, warn
+from dmpcli.primitives.smoothing import Stroke
+from dmpcli.records import recordings
+from dmpcli.records.layouts import Layout
+from dmpcli.records.streams import Source
+
+
+def recording(source: Source, layout: Layout | None) -> Stroke:
+    """Read a recording, and say how it was read and what is doubtful about it."""
+    found = recordings.read(source, layout)
+    if found.ours and layout is not None:
+        tell(
+            f"{source.name}: is dmpcli's own and tells its columns and units; options were not used"
+        )
+    for remark in found.told:
+        tell(f"{source.name}: {remark}")
+    for doubt in found.doubts:
+        warn(f"{source.name}: {doubt}")
+    return found.stroke
