@@ -233,7 +233,7 @@ samples: $(VENV)/installed
 	$(DMPCLI) record -o sample_runs/recorded.parquet --config sample_runs/recorded.toml --seed 1
 
 schemas: $(VENV)/installed
-	$(BIN)/python -m dmpcli.records.publish
+	$(BIN)/python -m dmpcli.records.json_schema
 
 clean:
 	rm -rf $(OUT)

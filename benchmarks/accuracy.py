@@ -7,39 +7,41 @@ equations and weights; heights and errors with the noise-free stroke itself. ``m
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.measures.paper import EXPERIMENTS, REPRODUCTION, Experiment
-from dmpcli.measures.wave import stroke_wave
-from dmpcli.primitives import references
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import draw
-from dmpcli.primitives.drawn_strokes import Style
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.skill import Skill
-from dmpcli.primitives.smoothing import Stroke
+from dmpcli.dmp import reference_paths
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+from dmpcli.dmp.generalization import draw
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.skill import Skill
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.metrics.paper_values import EXPERIMENTS, REPRODUCTION, Experiment
+from dmpcli.metrics.wave_height import stroke_wave
+from dmpcli.spatial import rotations
 
 UP = np.array([0.0, 0.0, 1.0])
-PAPER = Choices(alpha_1=1.7, widths="power", learning="paper")
+PAPER = FitOptions(alpha_1=1.7, widths="power", learning="paper")
 ROWS = {
-    "modified, default, LWR": Choices(),
-    "modified, default, ridge": Choices(regression="ridge"),
+    "modified, default, LWR": FitOptions(),
+    "modified, default, ridge": FitOptions(regression="ridge"),
     "modified, paper preset": PAPER,
-    "original, paper preset, literal (7)": Choices("original", "axis", alpha_1=1.7, widths="power"),
-    "original, paper preset, by distance": Choices(
+    "original, paper preset, literal (7)": FitOptions(
+        "original", "axis", alpha_1=1.7, widths="power"
+    ),
+    "original, paper preset, by distance": FitOptions(
         "original", "distance", alpha_1=1.7, widths="power"
     ),
 }
 
 
-def reference() -> Stroke:
+def reference() -> SmoothedStroke:
     """Return the paper's stroke without hand, sensor or servo, 50 Hz."""
     t = np.linspace(0.0, 10.0, 501)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
-    position = references.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
+    position = reference_paths.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
     down = rotations.from_euler(np.tile([np.pi, 0.0, 0.0], (501, 1)))
-    return Stroke(t, position, down)
+    return SmoothedStroke(t, position, down)
 
 
 def height(position: Floats, experiment: Experiment, normal: Floats) -> float:
@@ -90,7 +92,7 @@ def main() -> None:
         heights = []
         for experiment in EXPERIMENTS:
             pairs = Pairs(np.array([experiment.start]), np.array([experiment.goal]))
-            drawn = draw(result.skill, pairs, np.array([10.0]), None, Style())[0]
+            drawn = draw(result.skill, pairs, np.array([10.0]), None, GeneralizeOptions())[0]
             heights.append(height(drawn.position, experiment, UP))
         print(
             f"| {name} | {r.rms:.5f} | {r.end:.5f} | {heights[0]:.3f} | {heights[1]:.3f} "

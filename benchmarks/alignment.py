@@ -13,8 +13,8 @@ from time import process_time
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.primitives import smoothing
-from dmpcli.primitives.alignment import Demonstration, align
+from dmpcli.dmp import smoothing
+from dmpcli.dmp.alignment import Demonstration, align
 from tests.human_strokes import shapes, strokes
 
 

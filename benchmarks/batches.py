@@ -29,12 +29,12 @@ from benchmarks.cluster_demo import BIN, cluster
 from benchmarks.surfaces import FACES
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
-from dmpcli.batch.job import Task
-from dmpcli.primitives.drawing import draw_blocks
-from dmpcli.primitives.drawn_strokes import Style
-from dmpcli.primitives.generalization import Pairs
+from dmpcli.batch.part import Task
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+from dmpcli.dmp.generalization import draw_blocks
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.records import file_io
 from dmpcli.records import skill as skill_file
-from dmpcli.records import streams
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.surfaces.mesh import Mesh
 from tests.surfaces import cases, fields
@@ -108,7 +108,7 @@ def against_pyarrow(place: Path) -> None:
     folder, bare = place / "batch", place / "bare"
     words = command(place, table, folder, "--jobs", 2)
     rss, pss = peak(words)
-    parts = sorted(folder.glob(streams.PART))
+    parts = sorted(folder.glob(file_io.PART))
     writers = [Writer(parts[i::2], bare) for i in range(2)]
     ours, theirs = [], []
     for _ in range(ROUNDS):
@@ -264,7 +264,7 @@ def on_a_mesh(place: Path) -> None:
         for count, times in ((few, short), (many, long)):
             table = table_of(place, rows[:count], f"curved-{count}")
             times.append(seconds(command(place, table, folder, *words)))
-    good = sum(pq.read_metadata(p).num_rows for p in folder.glob(streams.PART)) // 501
+    good = sum(pq.read_metadata(p).num_rows for p in folder.glob(file_io.PART)) // 501
     shutil.rmtree(folder)
     rate = (many - few) / (np.median(long) - np.median(short))
     print(f"| {len(F)} faces, {many} pairs × 501 samples, two processes | trajectories/s |")
@@ -293,8 +293,8 @@ _HELD: list[tuple[Task, Floats]] = []
 
 def in_memory(place: Path, V: Floats, F: Any, rows: Floats) -> float:
     """Trajectories per second of two processes that draw parts and write nothing."""
-    skill, _ = skill_file.decode(streams.read(place / "skill.json"))
-    task = Task(skill, Mesh(V, F), Style())
+    skill, _ = skill_file.decode(file_io.read(place / "skill.json"))
+    task = Task(skill, Mesh(V, F), GeneralizeOptions())
     _HELD.append((task, rows))
     firsts = list(range(0, 16_000, 2000))
     with multiprocessing.get_context("fork").Pool(2, memory.keep) as pool:
@@ -357,7 +357,7 @@ def bad_rows(place: Path) -> None:
         done = subprocess.run(command(place, table, folder, *options), stderr=subprocess.PIPE)
         named = drawn = 0
         if folder.is_dir():
-            status = pq.read_table(folder / streams.TABLE)["status"].to_pylist()
+            status = pq.read_table(folder / file_io.TABLE)["status"].to_pylist()
             named = int(np.sum([status[row] != "ok" and "line" in status[row] for row in bad]))
             drawn = status.count("ok")
         last = done.stderr.decode().strip().splitlines()[-1].replace(f"{place}/", "")

@@ -20,16 +20,16 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.measures.paper import REPRODUCTION
-from dmpcli.primitives import references
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.phase import even_in_time, phase
-from dmpcli.primitives.preprocessing import preprocess
-from dmpcli.primitives.regression import BandedRegression
-from dmpcli.primitives.smoothing import Stroke
+from dmpcli.dmp import reference_paths
+from dmpcli.dmp.canonical_system import even_in_time, phase
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.preprocessing import preprocess
+from dmpcli.dmp.regression import BandedRegression
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.metrics.paper_values import REPRODUCTION
+from dmpcli.spatial import rotations
 from tests import cases
 
 RUNS = 200
@@ -48,19 +48,19 @@ def milliseconds(task: Callable[[], object], runs: int = RUNS) -> tuple[float, f
     return float(np.median(times)), min(times)
 
 
-def reference() -> Stroke:
+def reference() -> SmoothedStroke:
     """Return the paper's stroke with a turning tool, 500 samples."""
     t = np.linspace(0.0, 10.0, 500)
     angles = np.stack([np.pi + 0.1 * np.sin(t), 0.1 * np.cos(t) - 0.1, 0.05 * t], axis=1)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
-    position = references.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
-    return Stroke(t, position, rotations.from_euler(angles))
+    position = reference_paths.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
+    return SmoothedStroke(t, position, rotations.from_euler(angles))
 
 
-def letters() -> Stroke:
+def letters() -> SmoothedStroke:
     """Return thirty cursive letters."""
     table = cases.letters()
-    return Stroke(table[:, 0], table[:, 1:4])
+    return SmoothedStroke(table[:, 0], table[:, 1:4])
 
 
 def short() -> None:
@@ -70,9 +70,9 @@ def short() -> None:
     basis = even_in_time(80, 10.0, 5.0, 1.0)
     forcing = np.random.default_rng(0).normal(size=(641, 6))
     square = np.random.default_rng(1).normal(size=(80, 80)) + 80 * np.eye(80)
-    skill = fit([stroke], Choices()).skill
+    skill = fit([stroke], FitOptions()).skill
     t = np.linspace(0.0, skill.duration, 500)
-    paper = Choices(alpha_1=1.7, widths="power", learning="paper")
+    paper = FitOptions(alpha_1=1.7, widths="power", learning="paper")
     rows: dict[str, Callable[[], object]] = {
         "numpy.linalg.solve, 80 × 80, 6 right sides": lambda: np.linalg.solve(
             square, square[:, :6]
@@ -81,8 +81,8 @@ def short() -> None:
         "regression, LWR": lambda: BandedRegression(basis, s).fit("lwr", forcing),
         "regression, ridge": lambda: BandedRegression(basis, s).fit("ridge", forcing),
         "response of eq. (9)-(11), 500 samples": lambda: skill.response(t),
-        "whole fit, LWR": lambda: fit([stroke], Choices()),
-        "whole fit, ridge": lambda: fit([stroke], Choices(regression="ridge")),
+        "whole fit, LWR": lambda: fit([stroke], FitOptions()),
+        "whole fit, ridge": lambda: fit([stroke], FitOptions(regression="ridge")),
         "whole fit, preset paper": lambda: fit([stroke], paper),
     }
     print("| 500 samples × 6, N = 80 | median ms | least ms | × solve |")
@@ -100,10 +100,10 @@ def many() -> None:
     print("\n| thirty letters, 3001 samples | N | passes | RMS, mm | least ms | peak, MiB |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
     for name, choices in {
-        "--basis auto": Choices(),
-        "--basis auto --regression ridge": Choices(regression="ridge"),
-        "--basis 2000": Choices(basis=2000),
-        "--basis 2000 --regression ridge": Choices(basis=2000, regression="ridge"),
+        "--basis auto": FitOptions(),
+        "--basis auto --regression ridge": FitOptions(regression="ridge"),
+        "--basis 2000": FitOptions(basis=2000),
+        "--basis 2000 --regression ridge": FitOptions(basis=2000, regression="ridge"),
     }.items():
         _, least = milliseconds(lambda c=choices: fit([stroke], c), 3)  # type: ignore[misc]
         tracemalloc.start()

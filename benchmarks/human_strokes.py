@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from dmpcli.measures.deviation import nearest_rms
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
 
@@ -20,7 +20,7 @@ def main() -> None:
     for regression in ("lwr", "ridge"):
         errors, ends, counts, beyond = [], [], [], 0
         for _, stroke in everything:
-            result = fit([stroke], Choices(regression=regression, trim=False))
+            result = fit([stroke], FitOptions(regression=regression, trim=False))
             frame, reached = result.skill.frame, result.skill.reached
             assert reached is not None
             reproduced = frame.start + result.reproductions[0].reproduced @ frame.axes.T

@@ -32,8 +32,7 @@ from dmpcli.control.signals import Interruption
 from dmpcli.control.watchdog import watched
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.planning import plan as planning
-from dmpcli.primitives.wrench import Tool
-from dmpcli.records import schemas, streams
+from dmpcli.records import file_io, schemas
 from dmpcli.records import tool as tool_file
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance
@@ -42,6 +41,7 @@ from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN, Scene
+from dmpcli.spatial.wrench import Tool
 
 BLOCKS = 3
 # A look-ahead that bears a busy machine: a benchmark that stops early measures nothing.
@@ -144,7 +144,7 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     # There and back: the next block begins where this one did.
     away = np.sin(np.pi * u) ** 2
     wave = np.column_stack([-109.0 * away, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
-    stroke = planning.Stroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
+    stroke = planning.PlannedStroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
     clock = Metered()
     bench = at.connect(clock, execution.scene(stroke, presses=False))
     servo = watched(bench.robot)
@@ -186,7 +186,7 @@ def main() -> int:
     options.add_argument("--sensor", default="mock:")
     options.add_argument("--tool", type=Path, metavar="FILE", help="the mock knows its own")
     given = options.parse_args()
-    tool = tool_file.decode(streams.read(given.tool)) if given.tool else PEN
+    tool = tool_file.decode(file_io.read(given.tool)) if given.tool else PEN
     at = Place(given.robot, given.sensor, tool)
     passed = True
     with tempfile.TemporaryDirectory() as name:

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dmpcli.arrays import Floats
-from dmpcli.primitives import noise
-from dmpcli.primitives.spline_smoothing import smooth
-from tests.primitives.recordings import corners, jerk, letters, pen_lift, six_seconds, times, wave
+from dmpcli.dmp import noise
+from dmpcli.dmp.spline_smoothing import smooth
+from tests.dmp.recordings import corners, jerk, letters, pen_lift, six_seconds, times, wave
 
 SEEDS = 30
 SIGMAS = (0.02, 0.1, 0.5)

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.errors import InputError
-from dmpcli.records import journal, record, streams
+from dmpcli.records import file_io, journal, record
 from dmpcli.simulation.hand import HandParameters
 
 MOST_LOST = 1.0
@@ -89,10 +89,10 @@ def kill(command: list[str], output: Path, after: float, leads: float) -> Fate:
         said = process.communicate()[1].strip()
     if ended or output.exists():
         # A machine that is too busy: lateness and watchdog stop the run, which loses nothing.
-        whole = output.exists() and len(record.decode(streams.read(output))) > 0
+        whole = output.exists() and len(record.decode(file_io.read(output))) > 0
         return Fate(killed - began, 0, np.inf, f"ended before it was killed: {said}", whole)
     try:
-        found = journal.read(streams.read(path, journal=True))
+        found = journal.read(file_io.read(path, journal=True))
     except InputError as error:
         lost = killed - began - leads
         return Fate(killed - began, 0, lost, "" if "holds no row" in str(error) else str(error))
@@ -104,7 +104,7 @@ def kill(command: list[str], output: Path, after: float, leads: float) -> Fate:
     )
     if done.returncode:
         return Fate(killed - began, 0, np.inf, f"recover: {done.stderr.strip()}")
-    kept = record.decode(streams.read(output))
+    kept = record.decode(file_io.read(output))
     rows, lost = len(found.rows), killed - float(found.rows.numbers("clock")[-1])
     sound = len(kept) == rows and bool((np.diff(kept.t) > 0).all())
     return Fate(

@@ -12,9 +12,9 @@ import time
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.surfaces import orientation
+from dmpcli.surfaces import frame_smoothing
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Lift
+from dmpcli.surfaces.surface import ChartImage
 from tests.surfaces import cases, fields
 
 FACES = (5_000, 50_000, 500_000)
@@ -24,7 +24,7 @@ HEADER = (
 )
 
 
-def wave_heights(case: cases.Case, lift: Lift) -> Floats:
+def wave_heights(case: cases.Case, lift: ChartImage) -> Floats:
     """Heights between neighbouring extrema of v, measured from the points on the true surface.
 
     The true v of a point near an extremum: the point's offset from the true curve along the true
@@ -56,7 +56,7 @@ def accuracy() -> None:
                 goal = mesh.closest(case.goal).position
                 end = np.linalg.norm(lift.position[:, -1] - goal, axis=1).max()
                 on = mesh.closest(lift.position).distance.max()
-                smooth = orientation.smoothed(lift.axes, lift.position)
+                smooth = frame_smoothing.smoothed(lift.axes, lift.position)
                 turn = [cases.turns(axes).max() for axes in (case.axes, lift.axes, smooth)]
                 print(
                     f"| {name} | {faces} | {periods} | {error:.4f} | {off:.4f} "

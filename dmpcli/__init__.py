@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.version import __version__
 
 if TYPE_CHECKING:
+    from dmpcli.dmp.skill import Skill
     from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
-    from dmpcli.primitives.skill import Skill
     from dmpcli.spatial.trajectory import Trajectory
     from dmpcli.surfaces.cylinder import Cylinder
     from dmpcli.surfaces.mesh import Mesh
@@ -30,7 +30,7 @@ _HOMES = {
     "InputError": "errors",
     "InstrumentError": "errors",
     "RefusedError": "errors",
-    "Skill": "primitives.skill",
+    "Skill": "dmp.skill",
     "Trajectory": "spatial.trajectory",
     "Cylinder": "surfaces.cylinder",
     "Mesh": "surfaces.mesh",

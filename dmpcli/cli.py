@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from dmpcli.commands.pose_words import joined
+from dmpcli.commands.pose_arguments import joined
 from dmpcli.errors import DmpError
 from dmpcli.version import __version__
 
@@ -31,7 +31,7 @@ COMMANDS = {
 """Each subcommand, which is the module of `dmpcli.commands` of its name, in one sentence."""
 
 
-class Command(TyperCommand):
+class LazyCommand(TyperCommand):
     """Stands for a subcommand until it is called or asked; then its module is loaded."""
 
     def make_context(
@@ -54,7 +54,7 @@ class Group(TyperGroup):
 
     def __init__(self, **said: Any) -> None:
         super().__init__(**said)
-        self.commands = {name: Command(name, help=text) for name, text in COMMANDS.items()}
+        self.commands = {name: LazyCommand(name, help=text) for name, text in COMMANDS.items()}
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words after the program's name; poses of six words become one value."""

@@ -10,9 +10,9 @@ import sys
 
 import numpy as np
 
-from dmpcli.measures.paper import REPRODUCTION
-from dmpcli.primitives import references
-from dmpcli.records import record, schemas, streams
+from dmpcli.dmp import reference_paths
+from dmpcli.metrics.paper_values import REPRODUCTION
+from dmpcli.records import file_io, record, schemas
 from dmpcli.records.record import Provenance, Record
 
 RATE = 50.0
@@ -24,7 +24,7 @@ def main() -> None:
     """Write the file that the command line names."""
     t = np.arange(round(DURATION * RATE) + 1) / RATE
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
-    position = references.sine(start, goal, WAVE_HEIGHT, t, DURATION)
+    position = reference_paths.sine(start, goal, WAVE_HEIGHT, t, DURATION)
     columns = {"t": t} | {name: position[:, i] for i, name in enumerate("xyz")}
     columns |= {"rx": np.full(len(t), np.pi), "ry": np.zeros(len(t)), "rz": np.zeros(len(t))}
     options = {"reference": "sine", "wave_height": WAVE_HEIGHT, "duration": DURATION}
@@ -37,7 +37,7 @@ def main() -> None:
     }
     facts = {"simulated": True, "reference": reference, "noise_free": True}
     provenance = Provenance("make_reference.py", options, facts=facts)
-    streams.write(sys.argv[1], record.encode(Record(schemas.DEMONSTRATION, columns, provenance)))
+    file_io.write(sys.argv[1], record.encode(Record(schemas.DEMONSTRATION, columns, provenance)))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import trimesh
 from scipy.spatial import Delaunay
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.records import streams
+from dmpcli.records import file_io
 
 TOP, TANGENT, RADIUS = -17.54, 5.106, 86.774
 """Of the bench: z of its top, y where the fillet begins, radius of the fillet, mm."""
@@ -100,7 +100,7 @@ SURFACES = {"bench": bench, "saddle": saddle, "scan": scan}
 def main() -> None:
     """Write all of them into the folder that the command line names."""
     for name, make in SURFACES.items():
-        streams.write(Path(sys.argv[1]) / f"{name}.stl", stl(*make()))
+        file_io.write(Path(sys.argv[1]) / f"{name}.stl", stl(*make()))
 
 
 if __name__ == "__main__":

@@ -69,7 +69,7 @@ def test_errors_have_the_exit_codes_of_the_contract(monkeypatch, error, code):
     def fail(*_, **__):
         raise error("a.csv: is wrong")
 
-    monkeypatch.setattr("dmpcli.records.streams.read", fail)
+    monkeypatch.setattr("dmpcli.records.file_io.read", fail)
     done = CliRunner().invoke(cli.app, ["inspect", "a.csv"])
     assert done.exit_code == code
     assert done.stderr == "dmpcli: a.csv: is wrong\n"
@@ -79,7 +79,7 @@ def test_a_defect_of_ours_keeps_its_traceback_and_is_exit_code_1(monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("ours")
 
-    monkeypatch.setattr("dmpcli.records.streams.read", fail)
+    monkeypatch.setattr("dmpcli.records.file_io.read", fail)
     done = CliRunner().invoke(cli.app, ["inspect", "a.csv"])
     assert done.exit_code == 1
     assert isinstance(done.exception, ZeroDivisionError)

@@ -7,8 +7,8 @@ import igl
 import numpy as np
 import pytest
 
-from dmpcli.measures.paper import EXPERIMENTS
-from dmpcli.records import mesh, streams
+from dmpcli.metrics.paper_values import EXPERIMENTS
+from dmpcli.records import file_io, mesh
 
 FOLDER = Path(__file__).parents[1] / "sample_runs"
 CURVED = np.array([[-551.698, -37.580, -28.765], [-657.597, -43.254, -32.265]])
@@ -26,7 +26,7 @@ MAKER = script()
 
 
 def kept(name):
-    return mesh.decode(streams.read(FOLDER / f"{name}.stl"))
+    return mesh.decode(file_io.read(FOLDER / f"{name}.stl"))
 
 
 @pytest.mark.parametrize("name", MAKER.SURFACES)

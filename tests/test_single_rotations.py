@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dmpcli.rotations import exp_one, log_one
+from dmpcli.spatial.rotations import exp_one, log_one
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 9.9e-5, 1.1e-4, 0.01, 1.0, 2.0, 2.2, 3.14])

@@ -32,8 +32,8 @@ from benchmarks.peers.models import (
     PyDmps,
 )
 from dmpcli.arrays import Floats
-from dmpcli.measures.paper import REPRODUCTION
-from dmpcli.primitives import references
+from dmpcli.dmp import reference_paths
+from dmpcli.metrics.paper_values import REPRODUCTION
 
 SAMPLES, ROUNDS, MANY = 500, 3, 10_000
 CHUNKS = (5, 10, 25, 50, 100, 200)
@@ -69,8 +69,8 @@ def demonstration() -> tuple[Floats, Floats]:
     """Times (T,), s, and poses (T, 6), mm and rad, of the paper's stroke with a turning tool."""
     t = np.linspace(0.0, 10.0, SAMPLES)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
-    position = references.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
-    s = references.minimum_jerk(t, 10.0)
+    position = reference_paths.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
+    s = reference_paths.minimum_jerk(t, 10.0)
     swing = 0.05 * np.sin(2.0 * np.pi * s)
     angles = np.stack([np.full(SAMPLES, 3.0) + swing, 0.02 * s, swing], axis=1)
     return t, np.hstack([position, angles])

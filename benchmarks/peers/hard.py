@@ -10,10 +10,10 @@ from mp_pytorch.mp import MPFactory
 
 from benchmarks.peers.models import D, K
 from dmpcli.arrays import Floats
-from dmpcli.measures.deviation import nearest_rms
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.smoothing import Stroke
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.metrics.deviation import nearest_rms
 from tests import cases, human_strokes
 
 STEP = 1e-3
@@ -45,9 +45,9 @@ def strokes() -> dict[str, tuple[Floats, Floats]]:
     return split
 
 
-def ours(t: Floats, position: Floats, choices: Choices) -> tuple[int, Floats]:
+def ours(t: Floats, position: Floats, choices: FitOptions) -> tuple[int, Floats]:
     """N, and the reproduction (S, 3)."""
-    result = fit([Stroke(t, position)], choices)
+    result = fit([SmoothedStroke(t, position)], choices)
     frame = result.skill.frame
     return len(result.skill.basis), (
         frame.start + result.reproductions[0].reproduced @ frame.axes.T
@@ -92,10 +92,10 @@ def main() -> None:
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
     )
     for name, (t, position) in strokes().items():
-        count, by_lwr = ours(t, position, Choices(trim=False))
+        count, by_lwr = ours(t, position, FitOptions(trim=False))
         if count > MOST:
-            count, by_lwr = ours(t, position, Choices(trim=False, basis=MOST))
-        _, by_ridge = ours(t, position, Choices(trim=False, basis=count, regression="ridge"))
+            count, by_lwr = ours(t, position, FitOptions(trim=False, basis=MOST))
+        _, by_ridge = ours(t, position, FitOptions(trim=False, basis=count, regression="ridge"))
         others = (movement_primitives(t, position, count), prodmp(t, position, count))
         errors = [nearest_rms(position, found) for found in (by_lwr, by_ridge, *others)]
         shown = " | ".join(f"{error:.4f}" for error in errors)

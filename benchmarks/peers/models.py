@@ -11,12 +11,12 @@ from movement_primitives.dmp import DMP
 from mp_pytorch.mp import MPFactory
 from pydmps.dmp_discrete import DMPs_discrete
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.primitives.choices import Choices, Method, Orientation
-from dmpcli.primitives.generalization import Pairs, curves, poses
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.smoothing import Stroke
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions, Method, Orientation
+from dmpcli.dmp.rollout import Pairs, curves, poses
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.spatial import rotations
 from dmpcli.surfaces.plane import pair_charts
 
 BASIS, K, D = 80, 100.0, 20.0
@@ -201,9 +201,9 @@ class Ours:
         self.name = f"dmpcli, --orientation {orientation}"
 
     def fit(self, t: Floats, Y: Floats) -> None:
-        stroke = Stroke(t, Y[:, :3], rotations.from_euler(Y[:, 3:]))
+        stroke = SmoothedStroke(t, Y[:, :3], rotations.from_euler(Y[:, 3:]))
         self.t = t
-        self.result = fit([stroke], Choices(damping=D, basis=BASIS, regression=self.regression))
+        self.result = fit([stroke], FitOptions(damping=D, basis=BASIS, regression=self.regression))
 
     def prepare(self, start: Floats, goal: Floats) -> Callable[[], object]:
         skill = self.result.skill

@@ -17,7 +17,7 @@ import pyarrow as pa
 import scipy
 
 from dmpcli import extras
-from dmpcli.batch.job import Job, Outcome, Part, draw_part
+from dmpcli.batch.part import Job, Outcome, Part, draw_part
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import DmpError, InputError, InstrumentError
 from dmpcli.version import __version__

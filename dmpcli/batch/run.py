@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.batch.folder import Folder
-from dmpcli.batch.job import Job, Outcome, Part, file_of
+from dmpcli.batch.dataset_folder import Folder
+from dmpcli.batch.part import Job, Outcome, Part, file_of
 from dmpcli.batch.workers import Draw
+from dmpcli.dmp.copies import ends
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.time_scaling import timing
 from dmpcli.errors import RefusedError
-from dmpcli.primitives.copies import ends
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.retiming import timing
 from dmpcli.records import manifest, trajectory
 from dmpcli.records.pairs import OK, PairTable
 from dmpcli.records.record import Record

@@ -12,8 +12,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection, parent_process
 
-from dmpcli.batch import memory, nursery
-from dmpcli.batch.job import Job, Outcome, Part, draw_part
+from dmpcli.batch import memory, process_pool
+from dmpcli.batch.part import Job, Outcome, Part, draw_part
 from dmpcli.errors import InputError
 
 Draw = Callable[[Job, Iterable[Part]], Iterator[Outcome]]
@@ -35,7 +35,7 @@ def processes(count: int) -> Draw:
 
     def draw(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
         pool = ProcessPoolExecutor(
-            count, mp_context=nursery.context(), initializer=_begin, initargs=(job,)
+            count, mp_context=process_pool.context(), initializer=_begin, initargs=(job,)
         )
         waiting: set[Future[Outcome]] = set()
         try:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from dmpcli.admittance.payload_identification import FEWEST, condition
 from dmpcli.calibration.resting import Watcher, at_rest
 from dmpcli.calibration.tour import Interrupted
 from dmpcli.control import keyboard
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, counted
-from dmpcli.primitives.identification import FEWEST, condition
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.settings.calibrate import CalibrateSettings
 

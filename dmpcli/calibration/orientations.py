@@ -3,7 +3,7 @@
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 
 TWIST = np.pi / 4.0
 """Turn about the tool's own axis, one way in the first round and back in the second, rad."""

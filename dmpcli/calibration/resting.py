@@ -11,7 +11,7 @@ from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import Clock, RobotState, Sample, Servo
 from dmpcli.records.static_poses import StaticPose
-from dmpcli.rotations import exp, log
+from dmpcli.spatial.rotations import exp, log
 
 STILL, STILL_ANGLE = 0.05, 0.002
 """mm and rad: what stays within these of its mean is at rest."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dmpcli.admittance.payload_identification import check_orientations
 from dmpcli.arrays import Floats
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.resting import Watcher, at_rest
@@ -17,12 +18,11 @@ from dmpcli.control.servo_loop import ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
+from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Stroke
-from dmpcli.primitives.identification import check_orientations
-from dmpcli.primitives.reach import Reach
+from dmpcli.planning.plan import Plan, PlannedStroke
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.settings.calibrate import CalibrateSettings
 
@@ -128,9 +128,9 @@ class Tour:
                         "smaller --tilt"
                     )
 
-    def _there(self, goal: Pose) -> Stroke:
+    def _there(self, goal: Pose) -> PlannedStroke:
         """A stroke of one period that stays in a pose."""
-        return Stroke(
+        return PlannedStroke(
             "pose",
             np.array([0.0, self._settings.period]),
             np.array([goal[0], goal[0]]),

@@ -13,13 +13,13 @@ from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.settings.options import with_options
 
 if TYPE_CHECKING:
+    from dmpcli.admittance.payload_identification import Identification
     from dmpcli.control.signals import Interruption
     from dmpcli.control.workcell import Workcell
     from dmpcli.instruments.protocols import Clock, SensorInfo
-    from dmpcli.primitives.identification import Identification
-    from dmpcli.primitives.wrench import Tool
+    from dmpcli.records.file_io import Source
     from dmpcli.records.static_poses import StaticPose
-    from dmpcli.records.streams import Source
+    from dmpcli.spatial.wrench import Tool
 
 
 @with_options
@@ -57,7 +57,7 @@ def command(
     for a tilt of 45° all around, or say less with --tilt.
     """
     on_terminal(quiet)
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
 
     if from_file is not None and (by_hand or save is not None):
         raise InputError("--from: reads poses; --by-hand and --save take new ones")
@@ -65,8 +65,10 @@ def command(
         raise InputError("-o - --save -: standard output takes one of them")
     for name in (output, save):
         if name is not None:
-            streams.check_writable(name)
-    request = Request(output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force)
+            file_io.check_writable(name)
+    request = CalibrationRequest(
+        output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force
+    )
     if from_file is None:
         _measure(settings, request)
     else:
@@ -74,7 +76,7 @@ def command(
 
 
 @dataclass(frozen=True)
-class Request:
+class CalibrationRequest:
     """What the command line asks for beside the settings."""
 
     output: str
@@ -88,22 +90,22 @@ class Request:
     force: bool
 
 
-def _from_file(settings: "CalibrateSettings", request: Request, name: str) -> None:
-    from dmpcli.records import static_poses, streams
+def _from_file(settings: "CalibrateSettings", request: CalibrationRequest, name: str) -> None:
+    from dmpcli.records import file_io, static_poses
     from dmpcli.records import tool as tool_file
 
-    sources = {"poses": streams.read(name)}
+    sources = {"poses": file_io.read(name)}
     taken, facts = static_poses.decode(sources["poses"])
     if request.tool is None:
         geometry, sensor = tool_file.restored(facts, sources["poses"].name)
     else:
-        sources["tool"] = streams.read(request.tool)
+        sources["tool"] = file_io.read(request.tool)
         geometry = tool_file.geometry(sources["tool"])
         sensor = tool_file.sensor_of(facts, sources["poses"].name)
     _conclude(taken, geometry, sensor, settings, request, sources, {})
 
 
-def _measure(settings: "CalibrateSettings", request: Request) -> None:
+def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None:
     from dmpcli.calibration import result
     from dmpcli.calibration.by_hand import Keyboard
     from dmpcli.calibration.tour import Interrupted
@@ -111,7 +113,7 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.messages import tell, warn
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
     from dmpcli.simulation.mock import PEN
 
@@ -120,7 +122,7 @@ def _measure(settings: "CalibrateSettings", request: Request) -> None:
     repeatable = workcell.repeatable(addresses)
     _check_existing(request, repeatable)
     keyboard = Keyboard("--by-hand") if request.by_hand else None
-    source = None if request.tool is None else streams.read(request.tool)
+    source = None if request.tool is None else file_io.read(request.tool)
     geometry = PEN if source is None else tool_file.geometry(source)
     realtime = request.realtime or request.by_hand or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
@@ -201,7 +203,7 @@ def _take(
     )
 
 
-def _check_existing(request: Request, repeatable: bool) -> None:
+def _check_existing(request: CalibrationRequest, repeatable: bool) -> None:
     for name in (request.output, request.save):
         if name not in (None, "-") and not (repeatable or request.force) and Path(name).exists():
             raise InputError(
@@ -215,12 +217,12 @@ def _save(
     geometry: "Tool",
     info: "SensorInfo",
     settings: "CalibrateSettings",
-    request: Request,
+    request: CalibrationRequest,
     source: "Source | None",
     options: dict[str, Any],
 ) -> None:
     from dmpcli.calibration import result
-    from dmpcli.records import static_poses, streams
+    from dmpcli.records import file_io, static_poses
     from dmpcli.records import tool as tool_file
     from dmpcli.records.record import Provenance, input_of
 
@@ -232,7 +234,7 @@ def _save(
     }
     inputs = () if source is None else (input_of("tool", source),)
     provenance = Provenance("calibrate", options | settings.as_options(), inputs, facts)
-    streams.write(request.save, static_poses.encode(taken, provenance))
+    file_io.write(request.save, static_poses.encode(taken, provenance))
 
 
 def _conclude(
@@ -240,14 +242,14 @@ def _conclude(
     geometry: "Tool",
     sensor: Any,
     settings: "CalibrateSettings",
-    request: Request,
+    request: CalibrationRequest,
     sources: "dict[str, Source]",
     options: dict[str, Any],
 ) -> None:
     """Identify, say what came out, write the tool file."""
     from dmpcli.calibration import result
     from dmpcli.messages import tell, wanted
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
 
     found, remarks = result.identified(taken, geometry, settings.condition, settings.max_residual)
@@ -257,14 +259,14 @@ def _conclude(
         options | settings.as_options(),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
     )
-    streams.write(
+    file_io.write(
         request.output, tool_file.encode(result.with_payload(geometry, found), calibration)
     )
     for remark in remarks:
         tell(remark)
     if wanted():
         _show(found)
-    tell(f"{streams.shown(request.output, output=True)}: {result.verdict(found)}")
+    tell(f"{file_io.shown(request.output, output=True)}: {result.verdict(found)}")
 
 
 def _show(found: "Identification") -> None:

@@ -13,17 +13,17 @@ from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.settings.options import Given, with_options
 
 if TYPE_CHECKING:
+    from dmpcli.admittance.force_coupling import Filter
     from dmpcli.control.cycle import LoopOutcome, ReadyArm
     from dmpcli.control.execution_plan import CheckedPlan
     from dmpcli.control.servo_loop import PlanLoop
     from dmpcli.control.stroke_file import StrokeSelection
     from dmpcli.control.workcell import Workcell
-    from dmpcli.primitives.coupling import Filter
-    from dmpcli.primitives.reach import Reach
-    from dmpcli.primitives.wrench import Tool
+    from dmpcli.kinematics.reachability import Reach
+    from dmpcli.records.file_io import Source
     from dmpcli.records.record import Provenance
-    from dmpcli.records.streams import Source
-    from dmpcli.workflows.keeping import Keeper
+    from dmpcli.spatial.wrench import Tool
+    from dmpcli.workflows.run_output import RunOutput
 
 
 @with_options
@@ -79,7 +79,7 @@ def command(
         raise InputError("-o: name the run file, or ask for the checks alone with --dry-run")
     _execute(
         settings,
-        Request(
+        ExecutionRequest(
             trajectory=trajectory,
             ids=tuple(stroke_ids or ()),
             output=None if dry_run else output,
@@ -96,7 +96,7 @@ def command(
 
 
 @dataclass(frozen=True)
-class Request:
+class ExecutionRequest:
     """What the command line asks for beside the settings; no output is a dry run."""
 
     trajectory: str
@@ -112,7 +112,7 @@ class Request:
     force: bool
 
 
-def _execute(settings: "ExecuteSettings", request: Request) -> None:
+def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
     from dmpcli.control import (
         execution,
         execution_plan,
@@ -125,8 +125,8 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     from dmpcli.control.watchdog import watched
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.messages import tell, warn
-    from dmpcli.records import streams
-    from dmpcli.workflows.keeping import Keeper
+    from dmpcli.records import file_io
+    from dmpcli.workflows.run_output import RunOutput
 
     addresses = workcell.check(request.robot, request.sensor, request.allow_mixed)
     if request.sensor is not None:
@@ -135,13 +135,13 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
     _check_output(request, repeatable)
     tool_file = _read(request.tool)
     batch = stroke_file.find(request.trajectory, request.ids)
-    _warn_of(batch, streams.shown(request.trajectory))
+    _warn_of(batch, file_io.shown(request.trajectory))
     coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
     keeper = None
     if request.output is not None:
-        keeper = Keeper(request.output, realtime)
+        keeper = RunOutput(request.output, realtime)
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
@@ -184,7 +184,7 @@ def _execute(settings: "ExecuteSettings", request: Request) -> None:
         tell(execution.pressed(loop.pressing))
     stopped = closing or outcome.failure or outcome.signal
     if stopped and keeper.kept:
-        name = streams.shown(keeper.output, output=True)
+        name = file_io.shown(keeper.output, output=True)
         tell(f"{name}: {len(loop.log)} rows kept")
     if closing is not None and outcome.failure is None:
         raise closing
@@ -198,13 +198,13 @@ def _warn_of(batch: "StrokeSelection", name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
     from dmpcli.control import execution_plan
     from dmpcli.messages import warn
-    from dmpcli.records import marks
+    from dmpcli.records import tolerance_mark
 
     if batch.failed:
         warn(execution_plan.passed_over(batch.failed))
-    mark = marks.of_facts(batch.found[0].facts)
+    mark = tolerance_mark.of_facts(batch.found[0].facts)
     if mark is not None:
-        warn(marks.text(name, mark))
+        warn(tolerance_mark.text(name, mark))
 
 
 def _judged(
@@ -212,7 +212,7 @@ def _judged(
     settings: "ExecuteSettings",
     arm: "ReadyArm",
     reach: "Reach | None",
-    request: Request,
+    request: ExecutionRequest,
 ) -> "list[CheckedPlan]":
     """Plan and check every stroke from where the arm stands."""
     from dmpcli.control import execution_plan
@@ -222,12 +222,12 @@ def _judged(
         return execution_plan.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
-def _check_output(request: Request, repeatable: bool) -> None:
-    from dmpcli.records import streams
+def _check_output(request: ExecutionRequest, repeatable: bool) -> None:
+    from dmpcli.records import file_io
 
     if request.output is None:
         return
-    streams.check_writable(request.output)
+    file_io.check_writable(request.output)
     if not repeatable and not request.force and Path(request.output).exists():
         raise InputError(
             f"{request.output}: exists, and a run cannot be made again; --force replaces it"
@@ -235,9 +235,9 @@ def _check_output(request: Request, repeatable: bool) -> None:
 
 
 def _read(tool: Path | None) -> "Source | None":
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
 
-    return None if tool is None else streams.read(tool)
+    return None if tool is None else file_io.read(tool)
 
 
 def _decoded(tool_file: "Source | None", weighed: bool = True) -> "Tool | None":
@@ -253,10 +253,10 @@ def _loop(
     arm: "ReadyArm",
     judged: "list[CheckedPlan]",
     settings: "ExecuteSettings",
-    request: Request,
+    request: ExecutionRequest,
     coupling: "Filter | None",
     tool_file: "Source | None",
-    keeper: "Keeper",
+    keeper: "RunOutput",
 ) -> "PlanLoop":
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     from dmpcli.control import execution
@@ -287,7 +287,7 @@ def _tool(bench: "Workcell", tool_file: "Source | None") -> "Tool":
 
 def _provenance(
     settings: "ExecuteSettings",
-    request: Request,
+    request: ExecutionRequest,
     batch: "StrokeSelection",
     tool_file: "Source | None",
     simulated: bool,
@@ -317,7 +317,7 @@ def _provenance(
 
 
 def _stream(
-    loop: "PlanLoop", provenance: "Provenance", realtime: bool, keeper: "Keeper"
+    loop: "PlanLoop", provenance: "Provenance", realtime: bool, keeper: "RunOutput"
 ) -> "LoopOutcome":
     """Run the loop and write what it logged, whatever ended it."""
     from dmpcli.control import execution
@@ -343,7 +343,7 @@ def _stream(
     return outcome
 
 
-def _end(outcome: "LoopOutcome", request: Request, left: str) -> None:
+def _end(outcome: "LoopOutcome", request: ExecutionRequest, left: str) -> None:
     """Say how the run ended, with the exit code that it earns, and which strokes are left."""
     from dmpcli.messages import tell, warn
 

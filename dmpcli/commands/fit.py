@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Learn a skill from one or several demonstrations."""
     on_terminal(quiet)
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.workflows import surface_input
     from dmpcli.workflows.fit import check_said, learn
     from dmpcli.workflows.fit_messages import summary
@@ -52,15 +52,15 @@ def command(
     check_said(given, surface is not None)
     surface_input.check_options(surface, surface_pose, surface_unit)
     layout = form.as_layout()
-    streams.check_writable(output)
-    if [str(path) for path in demonstrations].count(streams.DASH) > 1:
+    file_io.check_writable(output)
+    if [str(path) for path in demonstrations].count(file_io.DASH) > 1:
         raise InputError("-: standard input can be read only once")
-    sources = [streams.read(path) for path in demonstrations]
+    sources = [file_io.read(path) for path in demonstrations]
     strokes = [recording(source, layout) for source in sources]
     named = None
     if surface is not None:
         named = surface_input.read(surface, surface_pose, surface_unit, summary=True)
     learned, result = learn(sources, strokes, settings, layout, named)
-    streams.write(output, learned.content)
+    file_io.write(output, learned.content)
     names = [source.name for source in sources]
-    tell(summary(streams.shown(output, output=True), names, result))
+    tell(summary(file_io.shown(output, output=True), names, result))

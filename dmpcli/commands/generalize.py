@@ -74,7 +74,7 @@ def command(
     """Draw a skill at new start and goal points."""
     on_terminal(quiet)
     from dmpcli.commands import batches as batch_options
-    from dmpcli.records import learned_skill, streams
+    from dmpcli.records import file_io, learned_skill
     from dmpcli.records import pairs as pair_file
     from dmpcli.records.record import encode
     from dmpcli.workflows import batches, process, single, surface_input
@@ -88,10 +88,10 @@ def command(
     _check_frame(place.in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
-        from dmpcli.batch import nursery
+        from dmpcli.batch import process_pool
 
-        nursery.begin()
-    learned = learned_skill.read(streams.read(skill))
+        process_pool.begin()
+    learned = learned_skill.read(file_io.read(skill))
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     read = None
@@ -104,7 +104,7 @@ def command(
         table = one_pair(start, goal, start_orientation, goal_orientation)
         options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
-        source = streams.read(pairs)
+        source = file_io.read(pairs)
         table, options = pair_file.read(source), wanted.as_options()
         inputs.append({"role": "pairs", "sha256": source.sha256})
     ready = prepared(
@@ -125,8 +125,8 @@ def command(
     )
     if pairs is None:
         drawn = single.draw_one(ready)
-        streams.write(output, encode(drawn.record))
-        tell(f"{streams.shown(output, output=True)}: {drawn.said}")
+        file_io.write(output, encode(drawn.record))
+        tell(f"{file_io.shown(output, output=True)}: {drawn.said}")
     else:
         batches.write(ready, output, wanted)
 
@@ -158,14 +158,14 @@ def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
 def _check_destination(
     output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
 ) -> None:
-    from dmpcli.records import record, streams
+    from dmpcli.records import file_io, record
     from dmpcli.records.pairs import FARTHEST
     from dmpcli.workflows.ranges import within
 
     if reproduce:
         if any(given is not None for given in (start, goal, pairs)):
             raise InputError("--reproduce takes the demonstrated ends; leave other ends out")
-        streams.check_writable(output)
+        file_io.check_writable(output)
         return
     if pairs is None:
         if start is None or goal is None:
@@ -174,11 +174,11 @@ def _check_destination(
             )
         within("--start", start, FARTHEST)
         within("--goal", goal, FARTHEST)
-        streams.check_writable(output)
+        file_io.check_writable(output)
         return
     if start is not None or goal is not None:
         raise InputError("--pairs names the starts and goals; leave --start and --goal out")
-    streams.check_folder(output)
+    file_io.check_folder(output)
     foreign = record.foreign_parts(output)
     if foreign:
         raise InputError(

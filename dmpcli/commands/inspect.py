@@ -29,21 +29,21 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
-    from dmpcli.figures import inspection
     from dmpcli.messages import tell
-    from dmpcli.records import mesh, streams
+    from dmpcli.records import file_io, mesh
+    from dmpcli.reporting import inspection
 
     if schema is not None:
-        streams.say(inspection.json_schema(schema))
+        file_io.say(inspection.json_schema(schema))
         return
     if file is None:
         raise InputError("FILE is missing: name a file, or - for standard input")
-    if Path(file).is_dir() and (Path(file) / streams.TABLE).is_file():
-        file = str(Path(file) / streams.TABLE)
-    source = streams.read(file)
+    if Path(file).is_dir() and (Path(file) / file_io.TABLE).is_file():
+        file = str(Path(file) / file_io.TABLE)
+    source = file_io.read(file)
     waiting = mesh.waiting(source)
     if waiting is not None:
         tell(waiting)
     found = inspection.inspected(source)
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
-    streams.say(text)
+    file_io.say(text)

@@ -14,8 +14,8 @@ from dmpcli.settings.record import TUTOR, RecordSettings, check
 if TYPE_CHECKING:
     from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.drag_loop import Recorder
+    from dmpcli.records.file_io import Source
     from dmpcli.records.record import Provenance, Record
-    from dmpcli.records.streams import Source
     from dmpcli.simulation.reference_strokes import Reference
 
 
@@ -47,12 +47,12 @@ def command(
     from dmpcli.control.signals import Interruption
     from dmpcli.control.watchdog import watched
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
     from dmpcli.records.schemas import DEMONSTRATION
     from dmpcli.simulation import reference_strokes, rehearsal
     from dmpcli.simulation.mock import PEN
-    from dmpcli.workflows.keeping import Keeper
+    from dmpcli.workflows.run_output import RunOutput
 
     check(settings)
     addresses = workcell.check(robot, sensor, allow_mixed)
@@ -63,10 +63,10 @@ def command(
     if settings.drag == "admittance" and settings.coasting > 1.0:
         tell(f"this tool coasts: M/D = {settings.coasting:g} s; --preset drag is light")
     check_output(output, repeatable, force)
-    tool_source = streams.read(tool) if tool else None
+    tool_source = file_io.read(tool) if tool else None
     held = tool_file.decode(tool_source) if tool_source else None
     stroke = reference_strokes.build(settings)
-    keeper = Keeper(output, realtime)
+    keeper = RunOutput(output, realtime)
     keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
     bench = workcell.connect(
@@ -146,10 +146,10 @@ def check_output(output: str, repeatable: bool, force: bool) -> None:
     InputError
         Before anything moves.
     """
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
 
-    streams.check_writable(output)
-    if not repeatable and not force and output != streams.DASH and Path(output).exists():
+    file_io.check_writable(output)
+    if not repeatable and not force and output != file_io.DASH and Path(output).exists():
         raise InputError(
             f"{output}: exists, and a recording cannot be made again; choose another name, or "
             "give --force"

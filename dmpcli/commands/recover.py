@@ -27,15 +27,15 @@ def command(
 ) -> None:
     """Make the file that a crash kept `record` or `execute` from writing."""
     on_terminal(quiet)
+    from dmpcli.records import file_io, record
     from dmpcli.records import journal as journals
-    from dmpcli.records import record, streams
 
-    streams.check_writable(output)
-    if output != streams.DASH and Path(output).is_file() and not force:
+    file_io.check_writable(output)
+    if output != file_io.DASH and Path(output).is_file() and not force:
         raise InputError(f"{output}: exists; choose another name, or give --force")
-    found = journals.read(streams.read(journal, journal=True))
+    found = journals.read(file_io.read(journal, journal=True))
     whole = _record(found)
-    streams.write(output, record.encode(whole))
+    file_io.write(output, record.encode(whole))
     tell(_summary(output, journal, found, whole))
 
 
@@ -61,12 +61,12 @@ def _record(found: "Found") -> "Record":
 
 
 def _summary(output: str, journal: str, found: "Found", whole: "Record") -> str:
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
 
     state = "all of the run" if found.whole else "as far as the journal goes"
     cut = f"; {found.unread} bytes of a broken end left out" if found.unread else ""
-    last = "" if journal == streams.DASH else f"; {journal} may be removed"
+    last = "" if journal == file_io.DASH else f"; {journal} may be removed"
     return (
-        f"{streams.shown(output, output=True)}: {counted(len(whole), 'row')}, {whole.t[-1]:.2f} s, "
+        f"{file_io.shown(output, output=True)}: {counted(len(whole), 'row')}, {whole.t[-1]:.2f} s, "
         f"{state}{cut}{last}"
     )

@@ -53,18 +53,18 @@ def command(
     from dmpcli.commands import register_checks
     from dmpcli.errors import about
     from dmpcli.messages import tell
-    from dmpcli.records import mesh, pose, streams
+    from dmpcli.records import file_io, mesh, pose
     from dmpcli.records import touched as touched_file
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.surfaces.registration import Part
+    from dmpcli.surfaces.registration import RegisteredPart
     from dmpcli.workflows.pose_hints import warn_of_angles
 
     guess, unit, max_error = settings.guess, settings.unit, settings.max_error
     if guess == "none" and initial is not None:
         raise InputError("--guess none searches all orientations; leave --initial out")
-    streams.check_writable(output)
-    sources = {"part": streams.read(part), "touched": streams.read(touched)}
+    file_io.check_writable(output)
+    sources = {"part": file_io.read(part), "touched": file_io.read(touched)}
     waiting = mesh.waiting(sources["part"])
     if waiting is not None:
         tell(waiting)
@@ -82,7 +82,7 @@ def command(
     tell(f"{part}: {mesh.summary(found)}")
     if len(found.F) > LARGE:
         tell(f"{part}: the search on {len(found.F)} faces takes a while")
-    part_shape = Part.of(Mesh(found.V, found.F))
+    part_shape = RegisteredPart.of(Mesh(found.V, found.F))
     scale = mesh.UNITS[unit]
     with about(str(touched)):
         first = register_checks.rough_pose(points, scale, rough, guess)
@@ -109,5 +109,5 @@ def command(
         unit,
         register_checks.runner_up(result),
     )
-    streams.write(output, content)
+    file_io.write(output, content)
     register_checks.tell_of(result, points, str(output), first)

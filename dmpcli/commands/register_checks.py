@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from dmpcli.records.pose import RunnerUp
     from dmpcli.records.touched import Touched
     from dmpcli.spatial.pose import Pose
-    from dmpcli.surfaces.registration import Part, Registration, Rival
+    from dmpcli.surfaces.registration import RegisteredPart, Registration, Rival
 
 _ALIKE = 4.0
 """Where two poses differ by less than this many RMS residuals everywhere, no touch tells them."""
@@ -57,7 +57,7 @@ def rough_pose(
 
 
 def registered(
-    points: "Touched", part: "Part", scale: float, start: "Pose | None", limit: float
+    points: "Touched", part: "RegisteredPart", scale: float, start: "Pose | None", limit: float
 ) -> "Registration":
     """Find the pose: by pairs, about a start, or without one in all orientations."""
     from dmpcli.spatial.pose import Pose
@@ -97,7 +97,7 @@ def _beyond(moved: float, turned: float) -> bool:
 def refuse_unsure(
     result: "Registration",
     points: "Touched",
-    part: "Part",
+    part: "RegisteredPart",
     start: "Pose | None",
     most_residual: float,
     most_error: float,
@@ -109,7 +109,7 @@ def refuse_unsure(
     ----------
     result : Registration
     points : Touched
-    part : Part
+    part : RegisteredPart
     start : Pose or None
         Where the search began; None for pairs and for all orientations.
     most_residual, most_error : float
@@ -206,7 +206,7 @@ def _uncertain(result: "Registration", points: "Touched", limit: float) -> str |
 def _refuse_start(
     result: "Registration",
     points: "Touched",
-    part: "Part",
+    part: "RegisteredPart",
     start: "Pose",
     limit: float,
     named: bool,
@@ -214,7 +214,7 @@ def _refuse_start(
     """Refuse a start, not the points, where a pose elsewhere fits them much better."""
     import numpy as np
 
-    from dmpcli import rotations
+    from dmpcli.spatial import rotations
     from dmpcli.surfaces.pose_bound import sure_rise
 
     try:
@@ -251,7 +251,7 @@ def _moved(result: "Registration", start: "Pose", touched: "Floats") -> tuple[fl
     """How far a pose is from a start: at the touched points' centre, mm, and turned, degrees."""
     import numpy as np
 
-    from dmpcli import rotations
+    from dmpcli.spatial import rotations
 
     centre = touched.mean(axis=0)
     in_part = (centre - result.position) @ result.rotation
@@ -272,8 +272,8 @@ def _away(rival: "Rival") -> str:
 
 def runner_up(result: "Registration") -> "RunnerUp | None":
     """Return the second best pose as the pose file keeps it."""
-    from dmpcli import rotations
     from dmpcli.records.pose import RunnerUp
+    from dmpcli.spatial import rotations
 
     rival = result.rival
     if rival is None:

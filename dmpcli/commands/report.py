@@ -15,12 +15,12 @@ from dmpcli.settings.recording import RecordingOptions
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
-    from dmpcli.figures.batch import Tables
-    from dmpcli.figures.document import Part
-    from dmpcli.figures.footing import Ground
-    from dmpcli.figures.many import Sight
-    from dmpcli.figures.measured import Row
     from dmpcli.records.layouts import Layout
+    from dmpcli.reporting.batch import Tables
+    from dmpcli.reporting.batch_measures import MeasurementContext
+    from dmpcli.reporting.document import DocumentPart
+    from dmpcli.reporting.report_surface import ReportSurface
+    from dmpcli.reporting.stroke_measures import Row
     from dmpcli.workflows.surface_input import SurfaceInput
 
 _WIDTH = 80
@@ -60,9 +60,10 @@ def command(
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     on_terminal(quiet)
-    from dmpcli.figures import document, many, strokes
     from dmpcli.messages import tell, warn
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
+    from dmpcli.reporting import batch_measures as many
+    from dmpcli.reporting import document, strokes
     from dmpcli.workflows import surface_input
 
     if files.count("-") > 1:
@@ -83,7 +84,7 @@ def command(
     if read is not None:
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
-        sight = many.Sight(document.reference_of(parts), ground, normal)
+        sight = many.MeasurementContext(document.reference_of(parts), ground, normal)
         parts = _measured(parts, sight, tables)
         report = document.document(parts, said)
         for line in document.warnings(report):
@@ -93,28 +94,28 @@ def command(
     if output is not None:
         tell(f"{output}: wrote {', '.join(written)}")
     if as_json:
-        streams.say(document.as_json(report))
+        file_io.say(document.as_json(report))
     else:
-        streams.say(document.as_text(report, _width()).encode())
+        file_io.say(document.as_text(report, _width()).encode())
 
 
-def _part(name: str, label: str, normal: "Floats | None", form: "Layout | None") -> "Part":
+def _part(name: str, label: str, normal: "Floats | None", form: "Layout | None") -> "DocumentPart":
     """Read one input, whatever it is; how recordings are seen, all of them together tell."""
     from dmpcli.errors import about
-    from dmpcli.figures.document import Part
-    from dmpcli.figures.ranking import Pupil
-    from dmpcli.figures.recorded import Recorded
-    from dmpcli.figures.strokes import states_of, strokes_of
-    from dmpcli.records import lesson, record, schemas, skill, streams
+    from dmpcli.records import file_io, learning_record, record, schemas, skill
+    from dmpcli.reporting.document import DocumentPart
+    from dmpcli.reporting.ranking import Pupil
+    from dmpcli.reporting.recorded import Recorded
+    from dmpcli.reporting.strokes import states_of, strokes_of
 
-    if name != streams.DASH and Path(name).is_dir():
+    if name != file_io.DASH and Path(name).is_dir():
         return _batch(Path(name), label, normal)
-    source = streams.read(name)
+    source = file_io.read(name)
     if source.content.lstrip()[:1] == b"{":
         learned, file = skill.decode(source)
         with about(source.name):
-            pupil = Pupil(label, learned, file, lesson.of_skill(file))
-        return Part(label, source.sha256, skill.SCHEMA, pupil=pupil)
+            pupil = Pupil(label, learned, file, learning_record.of_skill(file))
+        return DocumentPart(label, source.sha256, skill.SCHEMA, pupil=pupil)
     found = record.decode(source) if record.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
         from dmpcli.workflows.recording import recording as read_recording
@@ -124,60 +125,60 @@ def _part(name: str, label: str, normal: "Floats | None", form: "Layout | None")
         recorded = Recorded(recording, label, source.name, source.sha256, normal)
         if found is not None:
             recorded.origin = found.provenance
-        return Part(label, source.sha256, kind, recorded=recorded)
+        return DocumentPart(label, source.sha256, kind, recorded=recorded)
     run = found if found.schema is schemas.RUN else None
     states = None if run is None else states_of(run)
     with about(source.name):
         strokes = strokes_of(found, label, normal)
-    return Part(label, source.sha256, found.schema.name, strokes, run, states=states)
+    return DocumentPart(label, source.sha256, found.schema.name, strokes, run, states=states)
 
 
-def _batch(folder: Path, label: str, normal: "Floats | None") -> "Part":
+def _batch(folder: Path, label: str, normal: "Floats | None") -> "DocumentPart":
     """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
     from dmpcli.errors import about
-    from dmpcli.figures.document import MOST_ROWS, Part
-    from dmpcli.figures.strokes import pairs_of, strokes_of
     from dmpcli.messages import tell
-    from dmpcli.records import dataset, lesson, record, schemas, streams
+    from dmpcli.records import dataset, file_io, learning_record, record, schemas
+    from dmpcli.reporting.document import MOST_ROWS, DocumentPart
+    from dmpcli.reporting.strokes import pairs_of, strokes_of
 
     batch, odd = dataset.read(folder)
     for remark in odd:
         tell(remark)
     if len(batch) > MOST_ROWS:
         with about(str(folder)):
-            drawn_by = lesson.of_facts(dataset.facts_of(batch))
-        return Part(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
-    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
+            drawn_by = learning_record.of_facts(dataset.facts_of(batch))
+        return DocumentPart(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
+    pairs = record.decode(file_io.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
     strokes = []
     for name in batch.files:
-        part = record.decode(streams.read(folder / name), schemas.TRAJECTORY)
+        part = record.decode(file_io.read(folder / name), schemas.TRAJECTORY)
         with about(part.name):
             strokes += strokes_of(part, label, normal, known)
-    return Part(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
+    return DocumentPart(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
 
 
-def _ground(read: "SurfaceInput") -> "tuple[Ground, Row, Floats | None]":
+def _ground(read: "SurfaceInput") -> "tuple[ReportSurface, Row, Floats | None]":
     """Return the surface as figures see it, what the report says of it, and a plane's normal."""
-    from dmpcli.figures.footing import Ground
-    from dmpcli.records.lesson import surface_key
+    from dmpcli.records.learning_record import surface_key
+    from dmpcli.reporting.report_surface import ReportSurface
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.plane import Plane
 
     path = read.path
     found, key = read.surface, surface_key(read.facts)
     if isinstance(found, Mesh):
-        return Ground(path.name, found, found.V, found.F, key), read.said, None
+        return ReportSurface(path.name, found, found.V, found.F, key), read.said, None
     normal = found.normal if isinstance(found, Plane) else None
-    return Ground(path.name, found, key=key), read.said, normal
+    return ReportSurface(path.name, found, key=key), read.said, normal
 
 
-def _seen(parts: "list[Part]", ground: "Ground | None") -> "list[Part]":
+def _seen(parts: "list[DocumentPart]", ground: "ReportSurface | None") -> "list[DocumentPart]":
     """Let recordings be seen as the skills did that learned from them."""
     from dataclasses import replace
 
     from dmpcli.errors import about
-    from dmpcli.figures.document import lesson_for
+    from dmpcli.reporting.document import lesson_for
 
     pupils = [part.pupil for part in parts if part.pupil]
     done = []
@@ -194,13 +195,13 @@ def _seen(parts: "list[Part]", ground: "Ground | None") -> "list[Part]":
     return done
 
 
-def _placed(parts: "list[Part]", ground: "Ground") -> "list[Part]":
+def _placed(parts: "list[DocumentPart]", ground: "ReportSurface") -> "list[DocumentPart]":
     """Measure how every trajectory and run lies on the surface."""
     from dataclasses import replace
 
-    from dmpcli.figures.document import reference_of
-    from dmpcli.figures.footing import AT_ONCE, placed
     from dmpcli.messages import progress
+    from dmpcli.reporting.document import reference_of
+    from dmpcli.reporting.report_surface import AT_ONCE, placed
 
     reference = reference_of(parts)
     done = []
@@ -215,10 +216,10 @@ def _placed(parts: "list[Part]", ground: "Ground") -> "list[Part]":
     return done
 
 
-def _warn_of_ends(parts: "list[Part]", read: "SurfaceInput") -> None:
+def _warn_of_ends(parts: "list[DocumentPart]", read: "SurfaceInput") -> None:
     """Say of strokes that were planned to begin or end off the surface where it is instead."""
-    from dmpcli.figures.document import FAR
     from dmpcli.messages import warn
+    from dmpcli.reporting.document import FAR
     from dmpcli.workflows import off_surface
 
     lines = []
@@ -246,9 +247,9 @@ def _tables(output: Path | None, batches: bool) -> "Iterator[Tables | None]":
         return
     import csv
 
-    from dmpcli.figures.batch import STROKES, Tables
-    from dmpcli.figures.document import WAVES
-    from dmpcli.records.growing import growing
+    from dmpcli.records.atomic_text import growing
+    from dmpcli.reporting.batch import STROKES, Tables
+    from dmpcli.reporting.document import WAVES
 
     heads = {_WAVES: WAVES} | ({_STROKES: STROKES} if batches else {})
     with growing(output, list(heads)) as (waves, *strokes):
@@ -257,13 +258,15 @@ def _tables(output: Path | None, batches: bool) -> "Iterator[Tables | None]":
         yield Tables(waves, strokes[0] if strokes else None)
 
 
-def _measured(parts: "list[Part]", sight: "Sight", tables: "Tables | None") -> "list[Part]":
+def _measured(
+    parts: "list[DocumentPart]", sight: "MeasurementContext", tables: "Tables | None"
+) -> "list[DocumentPart]":
     """Measure large batches, and write down the wave heights of all strokes."""
     from dataclasses import replace
 
-    from dmpcli.figures.batch import measure
-    from dmpcli.figures.document import write_waves
     from dmpcli.messages import progress
+    from dmpcli.reporting.batch import measure
+    from dmpcli.reporting.document import write_waves
 
     done = []
     total = sum(len(part.batch) for part in parts if part.batch)
@@ -279,12 +282,14 @@ def _measured(parts: "list[Part]", sight: "Sight", tables: "Tables | None") -> "
     return done
 
 
-def _write(output: Path, report: "Row", parts: "list[Part]", ground: "Ground | None") -> list[str]:
+def _write(
+    output: Path, report: "Row", parts: "list[DocumentPart]", ground: "ReportSurface | None"
+) -> list[str]:
     """Write each file whole; return their names."""
-    from dmpcli.figures import document
-    from dmpcli.figures.batch_figures import batch_figures
-    from dmpcli.figures.gallery import gallery, spreads
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
+    from dmpcli.reporting import document
+    from dmpcli.reporting.batch_figures import batch_figures
+    from dmpcli.reporting.figures import gallery, spreads
 
     strokes = [stroke for part in parts for stroke in part.strokes]
     files = {
@@ -302,7 +307,7 @@ def _write(output: Path, report: "Row", parts: "list[Part]", ground: "Ground | N
     if not batches:
         (output / _STROKES).unlink(missing_ok=True)
     for name, content in files.items():
-        streams.write(output / name, content)
+        file_io.write(output / name, content)
     return [*files, _WAVES, *([_STROKES] if batches else [])]
 
 

@@ -18,10 +18,10 @@ from dmpcli.settings.record import TUTOR, RecordSettings, check
 from dmpcli.settings.simulate import SimulateOptions
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.wrench import Tool
     from dmpcli.simulation.elite_server.faults import LabFaults
-    from dmpcli.simulation.elite_server.lab import Setting
+    from dmpcli.simulation.elite_server.lab import LabParameters
     from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
+    from dmpcli.spatial.wrench import Tool
 
 
 CLEARANCE = 0.1
@@ -54,7 +54,7 @@ def command(
 
     from dmpcli.control.drag_loop import LONGEST_LOOKAHEAD
     from dmpcli.control.signals import Interruption
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.simulation.elite_server import faults as fault_words
     from dmpcli.simulation.elite_server.lab import VirtualLab
     from dmpcli.simulation.elite_server.lab_server import LabServer, Ports
@@ -67,7 +67,7 @@ def command(
         )
     faults = fault_words.parse(served.fault)
     if drawn is not None:
-        streams.check_writable(drawn)
+        file_io.check_writable(drawn)
     setting, hand = _scene(settings, faults, tool, served.strokes, served.lookahead)
     if surface is not None:
         setting = _on(surface, surface_pose, surface_unit, setting)
@@ -90,7 +90,7 @@ def command(
             while signals.number is None:
                 time.sleep(0.1)
         if drawn is not None and hand.track:
-            streams.write(drawn, _track(hand, settings))
+            file_io.write(drawn, _track(hand, settings))
         tell(f"strokes drawn by the hand: {hand.drawn}")
     raise typer.Exit(128 + signals.number)
 
@@ -101,11 +101,11 @@ def _scene(
     tool: Path | None,
     strokes: int,
     lookahead: float,
-) -> "tuple[Setting, VisitingHand]":
+) -> "tuple[LabParameters, VisitingHand]":
     """Lay the plate under the stroke, park the pen over it, and call the hand that draws it."""
     from dmpcli.simulation import reference_strokes, rehearsal
     from dmpcli.simulation.elite_server.joint_arm import LAG
-    from dmpcli.simulation.elite_server.lab import Setting
+    from dmpcli.simulation.elite_server.lab import LabParameters
     from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
     from dmpcli.simulation.mock import PEN
 
@@ -114,7 +114,7 @@ def _scene(
     # A set-point waits for its turn, then in the buffer, and the servos lag behind it.
     delay = 1.0 / settings.control_rate + lookahead + LAG
     tutor, lead_in = rehearsal.practised(stroke, scene.rotation, settings, delay)
-    setting = Setting(
+    setting = LabParameters(
         position=scene.position + CLEARANCE * stroke.normal,
         rotation=scene.rotation,
         tool=PEN if tool is None else _weighed(tool),
@@ -128,10 +128,10 @@ def _scene(
 
 def _weighed(path: Path) -> "Tool":
     """Read a tool whose weight is known: what hangs on a simulated sensor must weigh something."""
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
 
-    source = streams.read(path)
+    source = file_io.read(path)
     try:
         return tool_file.decode(source)
     except InputError:
@@ -142,7 +142,9 @@ def _weighed(path: Path) -> "Tool":
         ) from None
 
 
-def _on(path: Path, pose: str | None, unit: str | None, setting: "Setting") -> "Setting":
+def _on(
+    path: Path, pose: str | None, unit: str | None, setting: "LabParameters"
+) -> "LabParameters":
     """Put a surface in the place of the plate."""
     from dataclasses import replace
 
@@ -159,7 +161,7 @@ def _track(hand: "VisitingHand", settings: "RecordSettings") -> bytes:
 
     from dmpcli.records.record import Provenance, Record, encode
     from dmpcli.records.schemas import DEMONSTRATION
-    from dmpcli.rotations import to_euler
+    from dmpcli.spatial.rotations import to_euler
 
     times, positions, rotations = (np.array(each) for each in zip(*hand.track, strict=True))
     rows = np.column_stack([times - times[0], positions, to_euler(rotations)])

@@ -51,13 +51,13 @@ def command(
     from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.messages import tell
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
 
     every, count = settings.every, settings.count
     _check(pairs, angles, part, every, count)
     repeatable = workcell.repeatable(workcell.check(robot, None))
-    streams.check_writable(output)
+    file_io.check_writable(output)
     if output != "-" and not (repeatable or force) and Path(output).exists():
         raise InputError(
             f"{output}: exists, and points cannot be touched again alike; choose another name, or "
@@ -67,7 +67,7 @@ def command(
     keyboard = None if every is not None else Keyboard("touch without --every S --count N")
     realtime = realtime or keyboard is not None or not repeatable
     clock = MonotonicClock() if realtime else SimulatedClock()
-    geometry = None if tool is None else tool_file.geometry(streams.read(tool))
+    geometry = None if tool is None else tool_file.geometry(file_io.read(tool))
     bench = workcell.connect(robot, None, clock, tool=geometry)
     if bench.note:
         tell(bench.note)
@@ -97,10 +97,10 @@ def _check(
 def _part(path: Path) -> "Floats":
     import numpy as np
 
-    from dmpcli.records import streams, tables
+    from dmpcli.records import file_io, tables
     from dmpcli.records.touched import PART
 
-    table = tables.read(streams.read(path))
+    table = tables.read(file_io.read(path))
     return np.stack([table.numbers(name) for name in PART], axis=1)
 
 
@@ -136,12 +136,12 @@ def _take(
 
 def _end(points: "PointFile", output: str, signals: "Interruption") -> None:
     from dmpcli.messages import tell, warn
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records.points import PairFile
 
     if isinstance(points, PairFile) and points.open:
         warn(f"pair {points.count // 2 + 1} has no goal: touch it, or remove the row")
-    name = streams.shown(output, output=True)
+    name = file_io.shown(output, output=True)
     if points.count == 0:
         tell(f"{name}: no point was taken, nothing written")
     else:

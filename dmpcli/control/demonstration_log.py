@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from dmpcli.admittance.model import DragState
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.instruments.protocols import RobotState, Sample
-from dmpcli.primitives.admittance import Pose
-from dmpcli.records.rows import RECOVERED, Rows
+from dmpcli.records.row_buffer import RECOVERED, RowBuffer
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
-from dmpcli.rotations import to_euler_continuous
+from dmpcli.spatial.rotations import to_euler_continuous
 
 
 class DemonstrationLog:
@@ -20,7 +20,7 @@ class DemonstrationLog:
 
     Attributes
     ----------
-    rows : Rows
+    rows : RowBuffer
         ``clock`` is the loop's clock, which no file keeps; ``t`` counts from the recording's start.
     """
 
@@ -29,7 +29,7 @@ class DemonstrationLog:
         if referred:
             groups |= {"reference_position": 3, "reference_rotation": 9}
         groups |= {"wrench": 6, "sensed": 6, "sensor_seq": 1, "lost": 1}
-        self.rows = Rows(groups)
+        self.rows = RowBuffer(groups)
         self._first: Floats | None = None
         self._here: Floats = np.zeros(3)
         self._moved, self._t, self._since = 0.0, 0.0, 0
@@ -43,7 +43,12 @@ class DemonstrationLog:
         return self._t
 
     def add(
-        self, t: float, state: RobotState, reference: Pose | None, wrench: Floats, sample: Sample
+        self,
+        t: float,
+        state: RobotState,
+        reference: DragState | None,
+        wrench: Floats,
+        sample: Sample,
     ) -> None:
         """Remember one cycle.
 
@@ -52,7 +57,7 @@ class DemonstrationLog:
         t : float
             Since the recording began, s.
         state : RobotState
-        reference : Pose or None
+        reference : DragState or None
             Admittance output of this cycle; None where the robot's own drag teaching moves it.
         wrench : array, shape (6,)
             Compensated, at the TCP, base axes.
@@ -89,12 +94,12 @@ class DemonstrationLog:
         return columns(self.rows)
 
 
-def columns(rows: Rows) -> dict[str, AnyArray]:
+def columns(rows: RowBuffer) -> dict[str, AnyArray]:
     """Return the columns of the demonstration file, each of shape (rows,).
 
     Parameters
     ----------
-    rows : Rows
+    rows : RowBuffer
         Of a `DemonstrationLog`, this one or a journal's.
     """
     out: dict[str, AnyArray] = {"t": rows.numbers("t")}
@@ -112,7 +117,7 @@ def recovered() -> dict[str, str]:
     return {"ended": RECOVERED}
 
 
-def _pose_columns(rows: Rows, place: str, attitude: str, suffix: str) -> dict[str, AnyArray]:
+def _pose_columns(rows: RowBuffer, place: str, attitude: str, suffix: str) -> dict[str, AnyArray]:
     position = rows.numbers(place)
     # A pen that points straight down has rx = ±π: unwrapped, so that the column does not jump.
     angles = to_euler_continuous(rows.rotations(attitude))

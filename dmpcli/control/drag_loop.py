@@ -8,6 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dmpcli.admittance.compensation import Compensation, LowPass, dead_band
+from dmpcli.admittance.model import DragState, brake, move
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
 from dmpcli.control.cycle import (
@@ -32,10 +34,8 @@ from dmpcli.instruments.protocols import (
     Servo,
     ServoInfo,
 )
-from dmpcli.primitives.admittance import Pose, brake, move
-from dmpcli.primitives.compensation import Compensation, LowPass, dead_band
-from dmpcli.primitives.wrench import Tool
 from dmpcli.settings.record import RecordSettings
+from dmpcli.spatial.wrench import Tool
 
 STILL = 0.5
 """mm: a tool that stays within this of one point is at rest."""
@@ -213,7 +213,7 @@ class Recorder(ControlLoop):
             # Not before: it may have been moved since, and arms sink as their brakes are released.
             state = self._robot.state()
             guards.check_state(state, self._workspace)
-            self._reference = self._home = Pose(state.position, state.rotation, np.zeros(6))
+            self._reference = self._home = DragState(state.position, state.rotation, np.zeros(6))
         # Servos may take seconds to come on: what was felt meanwhile is past, but it is checked.
         self._sensing.hear(self._clock.now())
         self._heed()

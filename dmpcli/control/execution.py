@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from dmpcli.admittance.compensation import Compensation
+from dmpcli.admittance.force_coupling import Filter, fast_filter
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
@@ -16,27 +18,25 @@ from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.errors import InputError
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
 from dmpcli.kinematics import models
-from dmpcli.measures.contact import contact
+from dmpcli.kinematics.reachability import Reach
+from dmpcli.metrics.contact import contact
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import limits_of
-from dmpcli.planning.plan import Plan, Stroke
+from dmpcli.planning.plan import Plan, PlannedStroke
 from dmpcli.planning.preflight import Check
-from dmpcli.primitives.compensation import Compensation
-from dmpcli.primitives.coupling import Filter, fast_filter
-from dmpcli.primitives.reach import Reach
-from dmpcli.primitives.wrench import Tool
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.simulation.mock import Plate, Scene
+from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
 # A zero is taken over this time, s.
 ZERO_TIME = 0.5
 
 
-def scene(stroke: Stroke, presses: bool, height: float = 0.0) -> Scene:
+def scene(stroke: PlannedStroke, presses: bool, height: float = 0.0) -> Scene:
     """Return the mock lab where its URL says nothing.
 
     The arm is parked at the stroke's first pose. There is a plate only for a force coupling, which
@@ -44,7 +44,7 @@ def scene(stroke: Stroke, presses: bool, height: float = 0.0) -> Scene:
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     presses : bool
         Whether the force coupling is on.
     height : float
@@ -60,13 +60,13 @@ def scene(stroke: Stroke, presses: bool, height: float = 0.0) -> Scene:
 
 
 def prepare(
-    stroke: Stroke, settings: ExecuteSettings, state: RobotState, reach: Reach | None = None
+    stroke: PlannedStroke, settings: ExecuteSettings, state: RobotState, reach: Reach | None = None
 ) -> tuple[Plan, list[Check]]:
     """Plan the stroke from where the arm stands, and judge it.
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     settings : ExecuteSettings
     state : RobotState
     reach : Reach, optional
@@ -98,7 +98,7 @@ def prepare(
     return made, judge(stroke, made, settings, near, reach, joints)[0]
 
 
-def standing(stroke: Stroke, settings: ExecuteSettings, state: RobotState) -> list[Check]:
+def standing(stroke: PlannedStroke, settings: ExecuteSettings, state: RobotState) -> list[Check]:
     """Check that the arm stands at a stroke's start."""
     goal = state.rotation if stroke.rotation is None else stroke.rotation[0]
     gap = planning.gap((state.position, state.rotation), (stroke.position[0], goal))
@@ -106,7 +106,7 @@ def standing(stroke: Stroke, settings: ExecuteSettings, state: RobotState) -> li
 
 
 def judge(
-    stroke: Stroke,
+    stroke: PlannedStroke,
     plan: Plan,
     settings: ExecuteSettings,
     near: list[Check],
@@ -117,7 +117,7 @@ def judge(
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     plan : Plan
     settings : ExecuteSettings
     near : list of Check
@@ -209,7 +209,9 @@ def touch(
     return ForceInput(sensing, Compensation(zeroed), pressing)
 
 
-def coupling_filter(stroke: Stroke, facts: Mapping[str, Any], settings: ExecuteSettings) -> Filter:
+def coupling_filter(
+    stroke: PlannedStroke, facts: Mapping[str, Any], settings: ExecuteSettings
+) -> Filter:
     """Return the filter of eq. (10) on the normal axis.
 
     Where the facts state no tau, the stroke's duration stands for it: the time constant that

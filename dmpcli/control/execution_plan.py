@@ -10,12 +10,12 @@ from dmpcli.control import execution, guards
 from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection, listed
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import transfers
 from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
-from dmpcli.primitives.reach import Reach
 from dmpcli.settings.execute import ExecuteSettings
 
 CLEARANCE = 20.0

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmpcli.admittance import force_coupling
+from dmpcli.admittance.force_coupling import CouplingLaw, Displacement, Filter
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.plan import Plan
-from dmpcli.primitives import coupling
-from dmpcli.primitives.coupling import Displacement, Filter, Law
 
 # The force has settled when it stays this near to the set-point for this long.
 SETTLED_SHARE, SETTLED_TIME = 0.1, 0.1
@@ -26,7 +26,7 @@ class ForceTracker:
 
     Parameters
     ----------
-    law : Law
+    law : CouplingLaw
     filter_ : Filter
         Of the plan's servo period.
     plan : Plan
@@ -37,14 +37,16 @@ class ForceTracker:
 
     Attributes
     ----------
-    law : Law
+    law : CouplingLaw
     felt : list of float
         Forces along the normal on the stroke, of `on` on all strokes, N.
     e : float
         Output of the admittance model, mm along the normal.
     """
 
-    def __init__(self, law: Law, filter_: Filter, plan: Plan, lookahead: float = 0.0) -> None:
+    def __init__(
+        self, law: CouplingLaw, filter_: Filter, plan: Plan, lookahead: float = 0.0
+    ) -> None:
         self.law = law
         self._lookahead = lookahead
         self._filter = filter_
@@ -112,8 +114,8 @@ class ForceTracker:
             self.felt.append(force)
         # Until it has settled once, a contact that is lost again is sought like the first.
         state = self._state if self._found else replace(self._state, touched=False)
-        self._state = coupling.displace(self.law, state, force, retreat)
-        self._delta = coupling.follow(self._filter, self._delta, self._state.e)
+        self._state = force_coupling.displace(self.law, state, force, retreat)
+        self._delta = force_coupling.follow(self._filter, self._delta, self._state.e)
         return self.hold(index)
 
     def hold(self, index: float) -> Floats:

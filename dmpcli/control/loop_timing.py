@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from dmpcli.measures.timing import spread
+from dmpcli.metrics.timing import spread
 
 # A thread that wants to run waits so long for one that computes, s; by default it is 5 ms.
 _SWITCH = 2e-4

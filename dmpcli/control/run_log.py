@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.measures.timing import punctuality
-from dmpcli.records.rows import RECOVERED, Rows
+from dmpcli.metrics.timing import punctuality
+from dmpcli.records.row_buffer import RECOVERED, RowBuffer
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
 
@@ -68,7 +68,7 @@ class RunLog:
 
     Attributes
     ----------
-    rows : Rows
+    rows : RowBuffer
         ``clock`` is the loop's clock, which no file keeps.
     """
 
@@ -78,7 +78,7 @@ class RunLog:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
         groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
-        self.rows = Rows(groups, ("state", "phase", "id"))
+        self.rows = RowBuffer(groups, ("state", "phase", "id"))
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
     def __len__(self) -> int:
@@ -110,12 +110,12 @@ class RunLog:
         return columns(self.rows)
 
 
-def columns(rows: Rows) -> dict[str, AnyArray]:
+def columns(rows: RowBuffer) -> dict[str, AnyArray]:
     """Return the columns of a run file, each of shape (rows,).
 
     Parameters
     ----------
-    rows : Rows
+    rows : RowBuffer
         At least one; of a `RunLog`, this one or a journal's.
     """
     out: dict[str, AnyArray] = {name: rows.numbers(name) for name in _TIMES}

@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
-from dmpcli.rotations import log_one
+from dmpcli.spatial.rotations import log_one
 
 WINDOW = 0.05
 """s: what has moved less than `_DISTANCE` and `_ANGLE` for so long stands still."""

@@ -10,7 +10,7 @@ from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Pose, gap
-from dmpcli.rotations import log_one
+from dmpcli.spatial.rotations import log_one
 
 # The arm may be so far from the first set-point, mm and rad: brakes that are released let it sink
 # a little. Nor further than it may go in a period, but for the noise of an arm at rest.

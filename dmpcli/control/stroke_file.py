@@ -9,8 +9,8 @@ import numpy as np
 
 from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
-from dmpcli.planning.plan import Stroke
-from dmpcli.records import record, schemas, streams
+from dmpcli.planning.plan import PlannedStroke
+from dmpcli.records import file_io, record, schemas
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
 from dmpcli.records.trajectory_reader import rows_by_id, stored
@@ -25,12 +25,12 @@ class FoundStroke:
 
     Attributes
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     facts : dict
         Of the file, with the start, goal and normal of a batch's pair.
     """
 
-    stroke: Stroke
+    stroke: PlannedStroke
     facts: dict[str, Any]
 
 
@@ -56,7 +56,7 @@ class StrokeSelection:
     folder: bool
 
     @property
-    def strokes(self) -> list[Stroke]:
+    def strokes(self) -> list[PlannedStroke]:
         """The strokes alone."""
         return [found.stroke for found in self.found]
 
@@ -80,7 +80,7 @@ def find(path: str, wanted: Sequence[str] = ()) -> StrokeSelection:
     twice = [name for i, name in enumerate(wanted) if name in wanted[:i]]
     if twice:
         raise InputError(f"--id {twice[0]}: is given twice; a stroke is drawn once in a run")
-    if path != streams.DASH and Path(path).is_dir():
+    if path != file_io.DASH and Path(path).is_dir():
         return _in_folder(Path(path), wanted)
     source, rows = _grouped(path)
     names = _chosen(wanted, list(rows), source.name)
@@ -89,7 +89,7 @@ def find(path: str, wanted: Sequence[str] = ()) -> StrokeSelection:
 
 
 def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
-    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
+    pairs = record.decode(file_io.read_table(folder), schemas.PAIRS)
     ids = [str(name) for name in pairs.columns["id"]]
     parts = pairs.columns.get("part", np.full(len(pairs), None))
     rows_of = {name: row for row, name in enumerate(ids)}
@@ -117,7 +117,7 @@ def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
         for name in members:
             if name not in rows:
                 raise InputError(
-                    f"{source.name}: holds no stroke {name}, which {streams.TABLE} says is there; "
+                    f"{source.name}: holds no stroke {name}, which {file_io.TABLE} says is there; "
                     "generalize the batch again"
                 )
             found[name] = _found(source, name, rows[name], _pair_facts(pairs, rows_of[name]))
@@ -153,7 +153,7 @@ def _pair_facts(pairs: Record, row: int) -> dict[str, Any]:
 
 def _grouped(path: str) -> tuple[Record, dict[str, Integers]]:
     """Read a trajectory file; return it with the rows of each id, in order of appearance."""
-    source = record.decode(streams.read(path), schemas.TRAJECTORY)
+    source = record.decode(file_io.read(path), schemas.TRAJECTORY)
     return source, rows_by_id(source.columns["id"])
 
 
@@ -161,5 +161,5 @@ def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -
     if len(rows) < 2:
         raise InputError(f"{source.name}: stroke {name} has one row; a motion needs at least two")
     one = stored(source, name, rows, source.provenance.facts | dict(more))
-    stroke = Stroke(name, one.t, one.position, one.rotation, one.normal, one.first_row)
+    stroke = PlannedStroke(name, one.t, one.position, one.rotation, one.normal, one.first_row)
     return FoundStroke(stroke, one.facts)

@@ -7,9 +7,9 @@ from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments import registry
 from dmpcli.instruments.address import MOCK, Address, in_provenance, need_tool, split
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo, Servo
-from dmpcli.primitives.wrench import Tool
 from dmpcli.simulation.mock import Lab, MockSensor, MockServo, Scene
 from dmpcli.simulation.mock import options as mock
+from dmpcli.spatial.wrench import Tool
 
 __all__ = [
     "MOCK",

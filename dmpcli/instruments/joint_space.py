@@ -16,8 +16,8 @@ from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.instruments.pose_forms import Pose
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm
-from dmpcli.primitives.wrench import Tool
-from dmpcli.rotations import exp_one, log_one, to_euler
+from dmpcli.spatial.rotations import exp_one, log_one, to_euler
+from dmpcli.spatial.wrench import Tool
 
 # A step may need a joint speed over its limit by this share: rounding of what was planned.
 _SLACK = 0.01

@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
-from dmpcli.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
+from dmpcli.spatial.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
 
 METRE = 1000.0
 

@@ -24,8 +24,8 @@ from dmpcli.instruments.joint_space import JointSpace
 from dmpcli.instruments.pose_forms import Pose
 from dmpcli.instruments.protocols import Clock, RobotState, ServoInfo
 from dmpcli.kinematics import models
-from dmpcli.primitives.reach import Reach
-from dmpcli.primitives.wrench import Tool
+from dmpcli.kinematics.reachability import Reach
+from dmpcli.spatial.wrench import Tool
 
 
 class PoseServo:

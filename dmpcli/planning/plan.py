@@ -8,11 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.spline import between, spline, window
+from dmpcli.spatial import rotations
 
 Phase = Literal["approach", "stroke", "retract", "transfer", "stop"]
 Pose = tuple[Floats, Floats]
@@ -32,7 +32,7 @@ _WAYS = {
 
 
 @dataclass(frozen=True)
-class Stroke:
+class PlannedStroke:
     """One trajectory as its file says it.
 
     Attributes
@@ -183,7 +183,7 @@ class Plan:
 
 
 def make(
-    stroke: Stroke,
+    stroke: PlannedStroke,
     period: float,
     speed: float,
     limits: Limits,
@@ -194,7 +194,7 @@ def make(
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     period : float
         Servo period, s.
     speed : float
@@ -216,12 +216,12 @@ def make(
     return joined(sampled, [way], [], period, stroke.rotation is not None)
 
 
-def sample(stroke: Stroke, period: float, speed: float, held: Floats) -> Stroke:
+def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> PlannedStroke:
     """Return a stroke at the servo period, from t = 0, with an orientation.
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     period : float
         Servo period, s.
     speed : float
@@ -245,7 +245,7 @@ def sample(stroke: Stroke, period: float, speed: float, held: Floats) -> Stroke:
 
 
 def joined(
-    sampled: Stroke,
+    sampled: PlannedStroke,
     before: Sequence[PlanSegment],
     after: Sequence[PlanSegment],
     period: float,
@@ -255,7 +255,7 @@ def joined(
 
     Parameters
     ----------
-    sampled : Stroke
+    sampled : PlannedStroke
         At the servo period, with an orientation.
     before, after : sequence of PlanSegment
         An empty leg is none.

@@ -16,7 +16,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import plan as planning
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Phase, Plan, PlanSegment, Pose, Stroke
+from dmpcli.planning.plan import Phase, Plan, PlannedStroke, PlanSegment, Pose
 
 LONGEST_TOUR = 2_000_000
 """Set-points of a tour, about 0.3 GB; more must be drawn in several runs."""
@@ -71,14 +71,14 @@ class Height:
         return above
 
 
-def off(stroke: Stroke, held: Floats, end: int) -> Floats:
+def off(stroke: PlannedStroke, held: Floats, end: int) -> Floats:
     """Unit vector off the work at one end of a stroke.
 
     The surface's normal; where the stroke states none, back along the tool.
 
     Parameters
     ----------
-    stroke : Stroke
+    stroke : PlannedStroke
     held : array, shape (3, 3)
         Orientation where the stroke states none.
     end : int
@@ -90,12 +90,12 @@ def off(stroke: Stroke, held: Floats, end: int) -> Floats:
     return np.asarray(-R[:, 2])
 
 
-def height(strokes: Sequence[Stroke], held: Floats, clearance: float) -> Height:
+def height(strokes: Sequence[PlannedStroke], held: Floats, clearance: float) -> Height:
     """Find a height at which the tool may go from any stroke to any other.
 
     Parameters
     ----------
-    strokes : sequence of Stroke
+    strokes : sequence of PlannedStroke
         All points of all of them lie below it, by the clearance at least.
     held : array, shape (3, 3)
         Orientation where a stroke states none.
@@ -125,7 +125,7 @@ def height(strokes: Sequence[Stroke], held: Floats, clearance: float) -> Height:
 
 
 def plans(
-    strokes: Sequence[Stroke],
+    strokes: Sequence[PlannedStroke],
     period: float,
     speed: float,
     limits: Limits,
@@ -141,7 +141,7 @@ def plans(
 
     Parameters
     ----------
-    strokes : sequence of Stroke
+    strokes : sequence of PlannedStroke
         In the order in which they are drawn.
     period : float
         Servo period, s.
@@ -204,11 +204,11 @@ class _Travel:
     ways: TransferOptions
     slow: float
 
-    def led(self, here: Pose, stroke: Stroke) -> list[PlanSegment]:
+    def led(self, here: Pose, stroke: PlannedStroke) -> list[PlanSegment]:
         """Straight to a start that the arm stands at, but for a small gap."""
         return [self._leg("approach", here, stroke.pose(0), self.ways.landing)]
 
-    def to(self, here: Pose, stroke: Stroke) -> list[PlanSegment]:
+    def to(self, here: Pose, stroke: PlannedStroke) -> list[PlanSegment]:
         """Rise, cross, sink, land."""
         goal, speed, over = stroke.pose(0), self.ways.transfer, self.height
         hover = goal[0] + self.ways.clearance * off(stroke, goal[1], 0), goal[1]
@@ -223,7 +223,7 @@ class _Travel:
             self._leg("approach", hover, goal, self.ways.landing),
         ]
 
-    def off(self, stroke: Stroke) -> list[PlanSegment]:
+    def off(self, stroke: PlannedStroke) -> list[PlanSegment]:
         """Wait for the arm at the stroke's end, then leave the work along the normal."""
         end = stroke.pose(-1)
         hover = end[0] + self.ways.clearance * off(stroke, end[1], -1), end[1]

@@ -4,10 +4,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dmpcli.records import directions, documents
-from dmpcli.records.documents import Part
+from dmpcli.records import directions, json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.records.pairs import FARTHEST
-from dmpcli.records.streams import Source
 from dmpcli.surfaces.cylinder import Cylinder
 
 SCHEMA = "cylinder"
@@ -21,7 +21,7 @@ SMALLEST = 0.1
 Radius = Annotated[float, Field(ge=SMALLEST, le=FARTHEST, description="mm")]
 
 
-class CylinderFile(Part):
+class CylinderFile(JsonPart):
     """An endless cylinder in the robot's base frame; the tool may be outside or inside of it."""
 
     schema_name: Annotated[Literal["cylinder"], Field(alias="schema")] = "cylinder"
@@ -44,7 +44,7 @@ def decode(source: Source) -> Cylinder:
         Not JSON, another schema, a newer version, or not a point, an axis and a radius.
     """
     remedy = f"a cylinder is {FORM} in mm"
-    file = documents.validated(source, CylinderFile, SCHEMA, VERSION, remedy, by_hand=True)
+    file = json_files.validated(source, CylinderFile, SCHEMA, VERSION, remedy, by_hand=True)
     return Cylinder(
         directions.near(source, "point", file.point),
         directions.unit(source, "axis", file.axis, "point along the cylinder"),
@@ -54,4 +54,4 @@ def decode(source: Source) -> Cylinder:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of cylinder files."""
-    return documents.json_schema(CylinderFile, SCHEMA)
+    return json_files.json_schema(CylinderFile, SCHEMA)

@@ -13,19 +13,19 @@ import pyarrow.parquet as pq
 
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import manifest, record, schemas, streams
+from dmpcli.records import file_io, manifest, record, schemas
 from dmpcli.records.columns import columns_of
+from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, OK, START
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import NORMAL, Column, Schema
-from dmpcli.records.streams import Source
 from dmpcli.records.trajectory_reader import unit_normals
 
 AGAIN = "the command that draws it goes on from the parts that are there"
 
 
 @dataclass(frozen=True)
-class Batch:
+class BatchFolder:
     """What the table of a batch says of its pairs: some numbers each.
 
     Attributes
@@ -102,7 +102,7 @@ class Piece:
         return {name for name, column in self.columns.items() if not np.isnan(column).all()}
 
 
-def read(folder: Path) -> tuple[Batch, list[str]]:
+def read(folder: Path) -> tuple[BatchFolder, list[str]]:
     """Read the table of a finished batch, and check what its parts say of themselves.
 
     Returns
@@ -116,7 +116,7 @@ def read(folder: Path) -> tuple[Batch, list[str]]:
     InputError
         The batch is not finished; a part is missing, damaged, or of another batch; by name.
     """
-    source = streams.read_table(folder)
+    source = file_io.read_table(folder)
     batch = _table(folder, source)
     odd = _compared(batch)
     for file in batch.files:
@@ -124,7 +124,7 @@ def read(folder: Path) -> tuple[Batch, list[str]]:
     return batch, odd
 
 
-def _table(folder: Path, source: Source) -> Batch:
+def _table(folder: Path, source: Source) -> BatchFolder:
     table = record.parquet_table(source)
     provenance = _provenance(table.schema.metadata, schemas.PAIRS, source.name)
     named = schemas.PAIRS.columns
@@ -152,7 +152,7 @@ def _table(folder: Path, source: Source) -> Batch:
             return None
         return np.column_stack([columns[name][drawn] for name in names])
 
-    return Batch(
+    return BatchFolder(
         folder,
         source.sha256,
         provenance,
@@ -211,56 +211,56 @@ class _Bare:
         self.schema, self.metadata = self, metadata
 
 
-def _compared(batch: Batch) -> list[str]:
+def _compared(batch: BatchFolder) -> list[str]:
     """Compare the table with the manifest; what is odd."""
-    path = batch.folder / streams.MANIFEST
+    path = batch.folder / file_io.MANIFEST
     if not path.is_file():
         return [
-            f"{batch.folder}: {streams.MANIFEST} is missing, so the batch may not be finished; "
+            f"{batch.folder}: {file_io.MANIFEST} is missing, so the batch may not be finished; "
             f"{AGAIN}"
         ]
-    found = manifest.decode(streams.read(path))
+    found = manifest.decode(file_io.read(path))
     inputs = [entry.model_dump() for entry in found.inputs]
     if inputs != list(batch.provenance.inputs) or found.options != batch.provenance.options:
         raise InputError(
-            f"{path}: was written for other inputs or options than {streams.TABLE}; "
+            f"{path}: was written for other inputs or options than {file_io.TABLE}; "
             "draw the batch again"
         )
     listed = {entry.file for entry in found.parts}
     unlisted = next((file for file in batch.files if file not in listed), None)
     if unlisted is not None:
         raise InputError(
-            f"{batch.folder / unlisted}: does not belong to {streams.MANIFEST}; "
+            f"{batch.folder / unlisted}: does not belong to {file_io.MANIFEST}; "
             "draw the batch again"
         )
     lost = sorted(listed - set(batch.files))
     if lost:
         raise InputError(
-            f"{path}: lists {lost[0]}, of which {streams.TABLE} knows nothing; draw the batch again"
+            f"{path}: lists {lost[0]}, of which {file_io.TABLE} knows nothing; draw the batch again"
         )
     for entry in found.parts:
         part = batch.folder / entry.file
         size = part.stat().st_size if part.is_file() else None
         if size is not None and size != entry.bytes:
             raise InputError(
-                f"{part}: has {size} bytes, {streams.MANIFEST} says {entry.bytes}: it is damaged "
+                f"{part}: has {size} bytes, {file_io.MANIFEST} says {entry.bytes}: it is damaged "
                 "or of another batch; draw the batch again"
             )
-    there = {file.name for file in batch.folder.glob(streams.PART)}
+    there = {file.name for file in batch.folder.glob(file_io.PART)}
     more = sorted(there - listed)
     if not more:
         return []
     others = f" and {len(more) - 1} more" if len(more) > 1 else ""
     return [
-        f"{batch.folder}: {more[0]}{others} is not in {streams.MANIFEST} and left out of the report"
+        f"{batch.folder}: {more[0]}{others} is not in {file_io.MANIFEST} and left out of the report"
     ]
 
 
-def _footer(batch: Batch, file: str) -> tuple[pq.ParquetFile, Provenance]:
+def _footer(batch: BatchFolder, file: str) -> tuple[pq.ParquetFile, Provenance]:
     """Open a part and check that it belongs to the batch."""
     path = batch.folder / file
     if not path.is_file():
-        raise InputError(f"{path}: is missing, {streams.TABLE} names it; {AGAIN}")
+        raise InputError(f"{path}: is missing, {file_io.TABLE} names it; {AGAIN}")
     try:
         part = pq.ParquetFile(path, read_dictionary=["id"])
     except (pa.ArrowException, OSError, ValueError):
@@ -271,29 +271,29 @@ def _footer(batch: Batch, file: str) -> tuple[pq.ParquetFile, Provenance]:
     ours = batch.provenance
     if (found.options, found.inputs) != (ours.options, ours.inputs):
         raise InputError(
-            f"{path}: was drawn from other inputs or options than {streams.TABLE}; "
+            f"{path}: was drawn from other inputs or options than {file_io.TABLE}; "
             "draw the batch again"
         )
     return part, found
 
 
-def facts_of(batch: Batch) -> dict[str, Any]:
+def facts_of(batch: BatchFolder) -> dict[str, Any]:
     """Return the facts of a batch's first part; all of them have the same skill."""
     return dict(_footer(batch, batch.files[0])[1].facts) if batch.files else {}
 
 
 def pieces(
-    batch: Batch, columns: Sequence[str], parts: Sequence[int] | None = None
+    batch: BatchFolder, columns: Sequence[str], parts: Sequence[int] | None = None
 ) -> Iterator[Piece]:
     """Yield the trajectories of a batch, one part or less at a time.
 
     Parameters
     ----------
-    batch : Batch
+    batch : BatchFolder
     columns : sequence of str
         Beside ``t x y z``, as far as a part has them.
     parts : sequence of int, optional
-        Only these, by place in `Batch.files`.
+        Only these, by place in `BatchFolder.files`.
 
     Raises
     ------
@@ -309,12 +309,12 @@ def pieces(
         if done < len(rows):
             lost = batch.ids[int(rows[done])].as_py()
             raise InputError(
-                f"{batch.folder / batch.files[number]}: lacks pair {lost!r}, which {streams.TABLE} "
+                f"{batch.folder / batch.files[number]}: lacks pair {lost!r}, which {file_io.TABLE} "
                 "says it holds; draw the batch again"
             )
 
 
-def _part(batch: Batch, file: str, rows: Integers, columns: Sequence[str]) -> Iterator[Piece]:
+def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str]) -> Iterator[Piece]:
     """Whole trajectories of one part; one that goes on in the next row group waits for it."""
     part, provenance = _footer(batch, file)
     name = str(batch.folder / file)
@@ -355,7 +355,7 @@ def _part(batch: Batch, file: str, rows: Integers, columns: Sequence[str]) -> It
         done += len(ids)
 
 
-def _check_normals(piece: Piece, batch: Batch, offset: int) -> None:
+def _check_normals(piece: Piece, batch: BatchFolder, offset: int) -> None:
     """Refuse normals that are no unit vectors, or not those of the table or the part."""
     if not piece.has(*schemas.NORMAL):
         return
@@ -393,11 +393,11 @@ def _same(name: str, ids: list[str], expected: Any, done: int) -> None:
     if ids == meant:
         return
     i = next((i for i, (a, b) in enumerate(zip(ids, meant, strict=False)) if a != b), len(meant))
-    where = f"where {streams.TABLE} says {meant[i]!r}" if i < len(meant) else "as one too many"
+    where = f"where {file_io.TABLE} says {meant[i]!r}" if i < len(meant) else "as one too many"
     raise InputError(f"{name}: holds pair {ids[i]!r} {where}; draw the batch again")
 
 
-def states_of(batch: Batch) -> tuple[dict[str, int], list[dict[str, Any]]]:
+def states_of(batch: BatchFolder) -> tuple[dict[str, int], list[dict[str, Any]]]:
     """Count the pairs by status, the reasons without the place of each row.
 
     Returns

@@ -4,8 +4,8 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import FARTHEST
-from dmpcli.records.streams import Source
 
 
 def near(source: Source, field: str, numbers: list[float]) -> Floats:

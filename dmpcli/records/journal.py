@@ -25,13 +25,13 @@ import pyarrow as pa
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
-from dmpcli.records import streams
+from dmpcli.records import file_io
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
-from dmpcli.records.rows import Rows
+from dmpcli.records.row_buffer import RowBuffer
 from dmpcli.records.schemas import SCHEMAS, Schema
-from dmpcli.records.streams import Source
 
-SUFFIX = streams.JOURNAL
+SUFFIX = file_io.JOURNAL
 VERSION = 1
 EVERY = 0.5
 """s between two writings; with the time that a sync takes this stays below one second."""
@@ -44,7 +44,7 @@ _KEY, _CHECK, _END = b"dmpcli journal", b"crc32", b"facts"
 def beside(output: str) -> Path | None:
     """Return the journal's name for an output; None for what is not a file with a name."""
     file = Path(output)
-    if output == streams.DASH or (file.exists() and not file.is_file()):
+    if output == file_io.DASH or (file.exists() and not file.is_file()):
         return None
     return file.with_name(file.name + SUFFIX)
 
@@ -55,7 +55,7 @@ class Journal:
     Parameters
     ----------
     path : Path
-    rows : Rows
+    rows : RowBuffer
         Filled by the loop, and by nobody else.
     schema : Schema
         Of the proper file.
@@ -68,7 +68,7 @@ class Journal:
         There is such a journal already, or it cannot be written.
     """
 
-    def __init__(self, path: Path, rows: Rows, schema: Schema, provenance: Provenance) -> None:
+    def __init__(self, path: Path, rows: RowBuffer, schema: Schema, provenance: Provenance) -> None:
         self.path = path
         self._rows = rows
         self._written = 0
@@ -87,7 +87,7 @@ class Journal:
             # The metadata go out with the first batch.
             self._stream.write_batch(_batch(rows, 0, 0, self._fields)[0])
             self._put()
-            streams.sync_folder(path.parent)
+            file_io.sync_folder(path.parent)
         except OSError as error:
             self.discard()
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
@@ -231,7 +231,7 @@ def _locked(path: str | Path) -> bool:
     return False
 
 
-def _fields(rows: Rows) -> Any:
+def _fields(rows: RowBuffer) -> Any:
     number = pa.float64()
     numbers = [
         pa.field(name, number if width == 1 else pa.list_(number, width), nullable=False)
@@ -240,7 +240,7 @@ def _fields(rows: Rows) -> Any:
     return pa.schema([*numbers, *(pa.field(n, pa.string(), nullable=False) for n in rows.texts)])
 
 
-def _batch(rows: Rows, first: int, last: int, fields: Any) -> tuple[Any, int]:
+def _batch(rows: RowBuffer, first: int, last: int, fields: Any) -> tuple[Any, int]:
     """Return rows as an Arrow batch, and their checksum."""
     widths = rows.groups.values()
     parts = np.split(rows.whole(first, last), np.cumsum(list(widths))[:-1], axis=1)
@@ -283,7 +283,7 @@ class Found:
         Of the proper file.
     provenance : Provenance
         Of the proper file; where the run did not come to its end, without the facts of the end.
-    rows : Rows
+    rows : RowBuffer
     whole : bool
         Whether the run came to its end.
     unread : int
@@ -292,7 +292,7 @@ class Found:
 
     schema: Schema
     provenance: Provenance
-    rows: Rows
+    rows: RowBuffer
     whole: bool
     unread: int
 
@@ -352,13 +352,13 @@ def _opened(reader: Any, name: str) -> tuple[dict[str, Any], Any]:
     return header, stream
 
 
-def _begun(header: Mapping[str, Any], name: str) -> tuple[Rows, Provenance]:
+def _begun(header: Mapping[str, Any], name: str) -> tuple[RowBuffer, Provenance]:
     """Return what a header says of rows and run."""
     try:
         known = header["provenance"]
         provenance = Provenance(**known | {"inputs": tuple(known["inputs"])})
         groups = {str(group): int(width) for group, width in header["groups"]}
-        return Rows(groups, [str(text) for text in header["texts"]]), provenance
+        return RowBuffer(groups, [str(text) for text in header["texts"]]), provenance
     except (KeyError, TypeError, ValueError):
         raise InputError(f"{name}: is damaged in its head; its rows cannot be read") from None
 
@@ -372,7 +372,7 @@ def _ended(notes: Mapping[bytes, bytes]) -> dict[str, Any] | None:
     return facts if isinstance(facts, dict) else None
 
 
-def _take(rows: Rows, batch: Any, notes: Mapping[bytes, bytes]) -> bool:
+def _take(rows: RowBuffer, batch: Any, notes: Mapping[bytes, bytes]) -> bool:
     """Add a batch to the rows; False where it is not what was written."""
     if batch.num_rows == 0:
         return True

@@ -292,14 +292,14 @@ def parted(name: str) -> tuple[str, str | None]:
 
 
 @dataclass(frozen=True)
-class Column:
+class LayoutColumn:
     """A column of a table as found: its own name, and the unit that its name tells."""
 
     name: str
     unit: str | None = None
 
 
-def found(layout: Layout, names: Sequence[str], ours: str) -> Column | None:
+def found(layout: Layout, names: Sequence[str], ours: str) -> LayoutColumn | None:
     """Find one of our columns in a table; None where it is not there.
 
     Parameters
@@ -316,10 +316,10 @@ def found(layout: Layout, names: Sequence[str], ours: str) -> Column | None:
     """
     for wanted in layout.names(ours):
         if wanted in names:
-            return Column(wanted, parted(wanted)[1])
+            return LayoutColumn(wanted, parted(wanted)[1])
         bare = [name for name in names if parted(name)[0] == wanted]
         if len(bare) == 1:
-            return Column(bare[0], parted(bare[0])[1])
+            return LayoutColumn(bare[0], parted(bare[0])[1])
         if layout.prefixed:
             ends = {name: before for name in names if (before := _before(name, wanted)) is not None}
             if layout.body is not None and ours not in ("t", NANOSECONDS):
@@ -330,7 +330,7 @@ def found(layout: Layout, names: Sequence[str], ours: str) -> Column | None:
                 raise InputError(f"several have {wanted}: {bodies}; choose one with --body NAME")
             if ends:
                 (name,) = ends
-                return Column(name, parted(name)[1])
+                return LayoutColumn(name, parted(name)[1])
     return None
 
 

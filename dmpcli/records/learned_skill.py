@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, fields
 
-from dmpcli.primitives.skill import Skill
+from dmpcli.dmp.skill import Skill
 from dmpcli.records import skill as skill_file
+from dmpcli.records.file_io import Source
 from dmpcli.records.skill import SkillFile
-from dmpcli.records.streams import Source
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,8 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.records import tables
+from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import POSITION
-from dmpcli.records.streams import Source
 
 _SAME = 1e-6
 _LEAST = 3

@@ -5,16 +5,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dmpcli.records import documents
-from dmpcli.records.documents import Part
+from dmpcli.records import json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.records.record import Provenance
-from dmpcli.records.streams import Source
 
 SCHEMA = "manifest"
 VERSION = 1
 
 
-class Entry(Part):
+class Entry(JsonPart):
     """One part of the batch."""
 
     file: str
@@ -23,14 +23,14 @@ class Entry(Part):
     bytes: Annotated[int, Field(ge=1)]
 
 
-class Input(Part):
+class Input(JsonPart):
     """One input of the batch."""
 
     role: str
     sha256: str
 
 
-class Manifest(Part):
+class Manifest(JsonPart):
     """A finished batch."""
 
     schema_name: Annotated[Literal["manifest"], Field(alias="schema")] = "manifest"
@@ -66,9 +66,9 @@ def decode(source: Source) -> Manifest:
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    return documents.validated(source, Manifest, SCHEMA, VERSION, "draw the batch again")
+    return json_files.validated(source, Manifest, SCHEMA, VERSION, "draw the batch again")
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of manifests."""
-    return documents.json_schema(Manifest, SCHEMA)
+    return json_files.json_schema(Manifest, SCHEMA)

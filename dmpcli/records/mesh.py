@@ -6,10 +6,10 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import LENGTH
 from dmpcli.records.mesh_formats import looks_like_mesh, triangles
 from dmpcli.records.mesh_polygons import Triangles
-from dmpcli.records.streams import Source
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.mesh import Mesh
@@ -66,7 +66,7 @@ def decode(source: Source, unit: str = "mm", option: str = "--unit") -> MeshFile
 
 
 def _decoded(name: str, found: Triangles, unit: str) -> MeshFile:
-    from dmpcli.surfaces.mending import mended
+    from dmpcli.surfaces.mesh_repair import mended
 
     try:
         mesh = mended(found.V * UNITS[unit], found.F)
@@ -95,9 +95,9 @@ def summary(mesh: MeshFile, shape: "Mesh | None" = None) -> str:
     shape : Mesh, optional
         The same, where it is made already.
     """
-    from dmpcli.surfaces.chordal import chordal_error
-    from dmpcli.surfaces.mending import components
+    from dmpcli.surfaces.chordal_error import chordal_error
     from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.mesh_repair import components
 
     error = chordal_error(mesh.V, mesh.F)
     pieces, noisy = components(mesh.F), (shape or Mesh(mesh.V, mesh.F)).noisy_share
@@ -121,10 +121,10 @@ def description(source: Source) -> dict[str, Any]:
     InputError
         A damaged file, or a mesh that is not safe to mend; by name.
     """
-    from dmpcli.surfaces.chordal import chordal_error
+    from dmpcli.surfaces.chordal_error import chordal_error
     from dmpcli.surfaces.extent import area, volume
-    from dmpcli.surfaces.mending import borders, components
     from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.mesh_repair import borders, components
 
     found = triangles(source)
     mesh = _decoded(source.name, found, "mm")

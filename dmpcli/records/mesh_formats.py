@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh_obj, mesh_off, mesh_ply, mesh_stl
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
-from dmpcli.records.streams import Source
 
 _MARK = b"\xef\xbb\xbf"
 """What some programs begin a text with: a byte order mark."""

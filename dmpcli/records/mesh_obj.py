@@ -10,8 +10,8 @@ import numpy as np
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh_polygons
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
-from dmpcli.records.streams import Source
 
 _LINE = re.compile(rb"^[ \t]*[vf][ \t]+\S", re.MULTILINE)
 _FACE = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)

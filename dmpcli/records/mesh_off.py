@@ -6,8 +6,8 @@ import numpy as np
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh_polygons, mesh_rows
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
-from dmpcli.records.streams import Source
 
 # Some files have their counts on the line of the word, or without a gap after it.
 _HEAD = re.compile(rb"\s*(?:ST)?C?N?(4?n?)OFF(?=[\s\d]|$)[ \t]*(BINARY)?", re.ASCII)

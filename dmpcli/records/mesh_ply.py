@@ -14,8 +14,8 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import mesh_polygons, mesh_rows
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
-from dmpcli.records.streams import Source
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",

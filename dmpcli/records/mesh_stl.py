@@ -11,8 +11,8 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, counted
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles, judge
-from dmpcli.records.streams import Source
 
 _HEADER = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

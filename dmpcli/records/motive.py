@@ -12,7 +12,7 @@ import numpy as np
 
 from dmpcli.errors import InputError
 from dmpcli.records import tables
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
 
 MAGIC = b"Format Version,"

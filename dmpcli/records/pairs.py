@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
-from dmpcli.primitives.generalization import Pairs
 from dmpcli.records import tables
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.spatial import rotations
 
 START = ("x0", "y0", "z0")
 GOAL = ("xg", "yg", "zg")

@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dmpcli.records import directions, documents
-from dmpcli.records.documents import Part
-from dmpcli.records.streams import Source
+from dmpcli.records import directions, json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.surfaces.plane import Plane
 
 SCHEMA = "plane"
@@ -15,7 +15,7 @@ FORM = '{"point": [x, y, z], "normal": [nx, ny, nz]}'
 """What people write."""
 
 
-class PlaneFile(Part):
+class PlaneFile(JsonPart):
     """A plane in the robot's base frame."""
 
     schema_name: Annotated[Literal["plane"], Field(alias="schema")] = "plane"
@@ -36,7 +36,7 @@ def decode(source: Source) -> Plane:
         Not JSON, another schema, a newer version, or not a point and a normal.
     """
     remedy = f"a plane is {FORM} in mm"
-    file = documents.validated(source, PlaneFile, SCHEMA, VERSION, remedy, by_hand=True)
+    file = json_files.validated(source, PlaneFile, SCHEMA, VERSION, remedy, by_hand=True)
     return Plane(
         directions.near(source, "point", file.point),
         directions.unit(source, "normal", file.normal, "point off the plane"),
@@ -45,4 +45,4 @@ def decode(source: Source) -> Plane:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of plane files."""
-    return documents.json_schema(PlaneFile, SCHEMA)
+    return json_files.json_schema(PlaneFile, SCHEMA)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.records import streams
+from dmpcli.records import file_io
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.schemas import EULER_ANGLES, POSITION
 from dmpcli.records.touched import PART
-from dmpcli.rotations import to_euler
+from dmpcli.spatial.rotations import to_euler
 
 _MM, _RAD = 4, 7
 """Decimals: a tenth of a micrometre, and as much at a metre."""
@@ -75,12 +75,12 @@ class PointFile:
 
     def _write(self, complete: int) -> None:
         """Keep the lines; on a pipe, those that will not change any more."""
-        if self._path == streams.DASH:
+        if self._path == file_io.DASH:
             ready = self._lines[self._told : complete]
             self._told = complete
-            streams.say("".join(f"{line}\n" for line in ready).encode())
+            file_io.say("".join(f"{line}\n" for line in ready).encode())
         else:
-            streams.write(Path(self._path), "".join(f"{line}\n" for line in self._lines).encode())
+            file_io.write(Path(self._path), "".join(f"{line}\n" for line in self._lines).encode())
 
 
 class PairFile(PointFile):
@@ -126,7 +126,7 @@ class PairFile(PointFile):
 
     def close(self) -> None:
         """Keep a last start without its goal, which a pipe has not got yet."""
-        if self._path == streams.DASH and self.open:
+        if self._path == file_io.DASH and self.open:
             self._write(len(self._lines))
 
 

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from dmpcli import rotations
 from dmpcli.errors import InputError
-from dmpcli.records import documents, streams
-from dmpcli.records.documents import Part
+from dmpcli.records import file_io, json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.records.schemas import EULER, FRAME
-from dmpcli.records.streams import Source
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.version import __version__
 
@@ -22,7 +22,7 @@ Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 Distance = Annotated[float, Field(ge=0)]
 
 
-class Residuals(Part):
+class Residuals(JsonPart):
     """Distances that the fit leaves, mm."""
 
     points: Annotated[int, Field(ge=0)]
@@ -30,7 +30,7 @@ class Residuals(Part):
     largest: Distance
 
 
-class Conditioning(Part):
+class Conditioning(JsonPart):
     """How well the touched points hold the part, see docs/registration.md."""
 
     number: Annotated[float, Field(ge=1, description="largest gain over smallest")]
@@ -44,7 +44,7 @@ class Conditioning(Part):
     ]
 
 
-class RunnerUp(Part):
+class RunnerUp(JsonPart):
     """The pose that fits best but one, among those that differ from it."""
 
     position: Annotated[Three, Field(description="as the pose's own, mm")]
@@ -55,7 +55,7 @@ class RunnerUp(Part):
     ]
 
 
-class PoseFile(Part):
+class PoseFile(JsonPart):
     """Where a part lies in the robot's base frame."""
 
     schema_name: Annotated[Literal["pose"], Field(alias="schema")] = "pose"
@@ -109,7 +109,7 @@ def decode(source: Source) -> tuple[Pose, PoseFile]:
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
     remedy = 'a pose is {"position": [x, y, z], "rotation": [rx, ry, rz]} in mm and rad'
-    file = documents.validated(source, PoseFile, SCHEMA, VERSION, remedy, by_hand=True)
+    file = json_files.validated(source, PoseFile, SCHEMA, VERSION, remedy, by_hand=True)
     return Pose.of(np.array([*file.position, *file.rotation])), file
 
 
@@ -137,7 +137,7 @@ def parse(value: str, option: str) -> tuple[Pose, Source | None]:
     words = value.split()
     numbers = [_number(word) for word in words]
     if not words or numbers[0] is None:
-        source = streams.read(value)
+        source = file_io.read(value)
         return decode(source)[0], source
     if len(words) != 6 or None in numbers:
         raise InputError(
@@ -158,4 +158,4 @@ def _number(word: str) -> float | None:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of pose files."""
-    return documents.json_schema(PoseFile, SCHEMA)
+    return json_files.json_schema(PoseFile, SCHEMA)

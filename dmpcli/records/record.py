@@ -10,13 +10,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.columns import TYPES, columns_of
+from dmpcli.records.file_io import PART, TABLE, Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
-from dmpcli.records.streams import PART, TABLE, Source
+from dmpcli.spatial import rotations
 from dmpcli.version import __version__
 
 KEY = b"dmpcli"

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats, Integers
+from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError, counted
-from dmpcli.primitives.smoothing import Stroke
 from dmpcli.records import (
     layouts,
     motive,
@@ -22,12 +21,13 @@ from dmpcli.records import (
     stamps,
     tables,
 )
-from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Column, Layout
+from dmpcli.records.file_io import Source
+from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Layout, LayoutColumn
 from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
 from dmpcli.records.schemas import EULER_ANGLES
-from dmpcli.records.streams import Source
 from dmpcli.records.tables import HeadlessError, Table
+from dmpcli.spatial import rotations
 
 SHORTEST = 10
 """Fewer samples than this are no stroke."""
@@ -54,7 +54,7 @@ class Recording:
 
     Attributes
     ----------
-    stroke : Stroke
+    stroke : SmoothedStroke
     told : tuple of str
         How it was read, and what was assumed for that.
     doubts : tuple of str
@@ -63,7 +63,7 @@ class Recording:
         Whether it is a file of this program's, which tells its units and angles.
     """
 
-    stroke: Stroke
+    stroke: SmoothedStroke
     told: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     ours: bool = False
@@ -85,7 +85,7 @@ class _Reading:
     def names(self) -> list[str]:
         return list(self.table.columns)
 
-    def find(self, ours: str) -> Column | None:
+    def find(self, ours: str) -> LayoutColumn | None:
         """Find one of our columns and count it as read."""
         try:
             column = layouts.found(self.layout, self.names, ours)
@@ -95,7 +95,7 @@ class _Reading:
             self.taken.append(column.name)
         return column
 
-    def unit(self, column: Column, kind: str, known: dict[str, float]) -> str:
+    def unit(self, column: LayoutColumn, kind: str, known: dict[str, float]) -> str:
         """Return a column's unit: as an option says, else its name, else the layout."""
         named = column.unit
         if named not in known and not column.name.endswith(("]", ")")):
@@ -136,7 +136,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     if record.is_ours(source):
         ours = record.decode(source, schemas.DEMONSTRATION)
         _partly_null(ours)
-        stroke = Stroke(ours.t, ours.position(), ours.rotation())
+        stroke = SmoothedStroke(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
         return Recording(stroke, ours=True)
@@ -148,7 +148,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
-    stroke = Stroke(t, position, rotation)
+    stroke = SmoothedStroke(t, position, rotation)
     if "sample_rate" not in given.said:
         stroke = _without_repeats(reading, stroke, name)
     _check_time(reading.table, stroke.t, name)
@@ -158,7 +158,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     return Recording(stroke, tuple(reading.told), tuple(reading.doubts))
 
 
-def stroke(source: Source, layout: Layout | None = None) -> Stroke:
+def stroke(source: Source, layout: Layout | None = None) -> SmoothedStroke:
     """Read a demonstration, see `read`, without what there is to say of it."""
     return read(source, layout).stroke
 
@@ -221,7 +221,7 @@ def _time(reading: _Reading) -> tuple[Floats, str]:
     return stamps.seconds(table, column.name, unit, within.name if within else None), column.name
 
 
-def _ros_time(reading: _Reading, column: Column) -> Floats:
+def _ros_time(reading: _Reading, column: LayoutColumn) -> Floats:
     """Read stamps of ROS in one column: nanoseconds where they are whole and that large."""
     values = reading.table.numbers(column.name)
     whole = len(values) > 0 and values[0] > 1e14
@@ -303,7 +303,7 @@ def _rotation(reading: _Reading) -> Floats | None:
 
 def _rotation_columns(
     reading: _Reading, form: str, wanted: tuple[str, ...], assumed: bool
-) -> list[Column] | None:
+) -> list[LayoutColumn] | None:
     """Find the columns of a form of rotation; None where there are none."""
     names = reading.names
     found = [layouts.found(reading.layout, names, ours) for ours in wanted]
@@ -312,7 +312,7 @@ def _rotation_columns(
             by = rotation_forms.numbered(form, names)
         except InputError as error:
             raise InputError(f"{reading.table.name}: {error}") from None
-        found = [Column(by[ours]) if ours in by else None for ours in wanted]
+        found = [LayoutColumn(by[ours]) if ours in by else None for ours in wanted]
     present = [column for column in found if column is not None]
     if len(present) == len(wanted):
         return present
@@ -330,7 +330,7 @@ def _rotation_columns(
     return None
 
 
-def _without_repeats(reading: _Reading, stroke: Stroke, name: str) -> Stroke:
+def _without_repeats(reading: _Reading, stroke: SmoothedStroke, name: str) -> SmoothedStroke:
     """Act on rows with one and the same stamp as the layout says."""
     how = reading.layout.repeated
     same = np.diff(stroke.t) == 0
@@ -352,10 +352,10 @@ def _without_repeats(reading: _Reading, stroke: Stroke, name: str) -> Stroke:
         R = rotations.from_quaternion(np.add.reduceat(q, starts, axis=0))
     elif R is not None:
         R = R[starts]
-    return Stroke(stroke.t[starts], position, R)
+    return SmoothedStroke(stroke.t[starts], position, R)
 
 
-def _doubt_units(reading: _Reading, stroke: Stroke) -> None:
+def _doubt_units(reading: _Reading, stroke: SmoothedStroke) -> None:
     """Doubt a stroke that no hand or arm draws; refuse one far too small for an unsaid unit."""
     found = plausibility.measures(stroke.t, stroke.position)
     length = reading.units.get("length", reading.layout.length)

@@ -10,9 +10,9 @@ from itertools import permutations
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.spatial import rotations
 
 EULER_NAMES = ("rx", "ry", "rz")
 QUATERNION_NAMES = ("qx", "qy", "qz", "qw")

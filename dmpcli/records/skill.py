@@ -10,17 +10,17 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
-from dmpcli.primitives import skill as skills
-from dmpcli.primitives.dynamics import Spring
-from dmpcli.primitives.phase import Basis
-from dmpcli.primitives.skill import Skill, TaskFrame, TaughtSurface
-from dmpcli.records import documents
-from dmpcli.records.documents import Part
+from dmpcli.dmp import skill as skills
+from dmpcli.dmp.canonical_system import Basis
+from dmpcli.dmp.skill import Skill, TaskFrame, TaughtSurface
+from dmpcli.dmp.transformation_system import TransformationGains
+from dmpcli.records import json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import EULER, FRAME
-from dmpcli.records.streams import Source
+from dmpcli.spatial import rotations
 
 SCHEMA: Literal["skill"] = "skill"
 VERSION = 2
@@ -31,7 +31,7 @@ Positive = Annotated[float, Field(gt=0)]
 Weights = Annotated[list[float], Field(min_length=1)]
 
 
-class Frame(Part):
+class Frame(JsonPart):
     """Where and how the stroke was demonstrated, in the base frame."""
 
     start: Annotated[Three, Field(description="mm")]
@@ -46,7 +46,7 @@ class Frame(Part):
     ]
 
 
-class Reproduction(Part):
+class Reproduction(JsonPart):
     """How well the skill gives back one demonstration, in mm."""
 
     sha256: str
@@ -65,14 +65,14 @@ class Reproduction(Part):
     ] = None
 
 
-class Surface(Part):
+class Surface(JsonPart):
     """The surface that the skill was taught on; its chart is the skill's."""
 
     kind: Literal["plane", "cylinder", "sphere", "mesh"]
     facts: Annotated[dict[str, Any], Field(description="its file's SHA-256, unit and pose")]
 
 
-class Reached(Part):
+class Reached(JsonPart):
     """How well the skill gives back what it was learned from, beyond the noise, in mm."""
 
     tolerance: Annotated[Positive, Field(description="of RMS and wave; four times it anywhere")]
@@ -82,7 +82,7 @@ class Reached(Part):
     within: Annotated[bool, Field(description="false marks the skill: later commands repeat it")]
 
 
-class Spread(Part):
+class Spread(JsonPart):
     """Scatter of several demonstrations about their mean."""
 
     share: Annotated[Weights, Field(description="of the duration")]
@@ -91,7 +91,7 @@ class Spread(Part):
     ]
 
 
-class SkillFile(Part):
+class SkillFile(JsonPart):
     """A dynamic movement primitive of six coordinates, learned by dmpcli fit."""
 
     schema_name: Annotated[Literal["skill"], Field(alias="schema")] = SCHEMA
@@ -217,7 +217,7 @@ def decode(source: Source) -> tuple[Skill, SkillFile]:
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    file = documents.validated(source, SkillFile, SCHEMA, VERSION, "fit the skill again")
+    file = json_files.validated(source, SkillFile, SCHEMA, VERSION, "fit the skill again")
     return _skill(file), file
 
 
@@ -229,7 +229,7 @@ def _skill(file: SkillFile) -> Skill:
     return Skill(
         model=file.model,
         forcing_scale=file.forcing_scale,
-        spring=Spring(array(file.k), array(file.d), file.tau),
+        spring=TransformationGains(array(file.k), array(file.d), file.tau),
         alpha_1=file.alpha_1,
         basis=Basis(array(file.centres), array(file.widths)),
         weights=array(file.weights),
@@ -255,10 +255,10 @@ def _skill(file: SkillFile) -> Skill:
         else TaughtSurface(file.surface.kind, file.surface.facts),
         heights=file.heights,
         side_guessed=file.side_guessed,
-        reached=None if file.reached is None else skills.Reached(**file.reached.model_dump()),
+        reached=None if file.reached is None else skills.Accuracy(**file.reached.model_dump()),
         spread=None
         if file.spread is None
-        else skills.Spread(array(file.spread.share), array(file.spread.deviation)),
+        else skills.DemonstrationSpread(array(file.spread.share), array(file.spread.deviation)),
     )
 
 
@@ -278,4 +278,4 @@ def _layout(value: Any, indent: int = 0) -> str:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of skill files."""
-    return documents.json_schema(SkillFile, SCHEMA)
+    return json_files.json_schema(SkillFile, SCHEMA)

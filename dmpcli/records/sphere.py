@@ -4,10 +4,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dmpcli.records import directions, documents
+from dmpcli.records import directions, json_files
 from dmpcli.records.cylinder import Radius
-from dmpcli.records.documents import Part
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.surfaces.sphere import Sphere
 
 SCHEMA = "sphere"
@@ -16,7 +16,7 @@ FORM = '{"centre": [x, y, z], "radius": r}'
 """What people write."""
 
 
-class SphereFile(Part):
+class SphereFile(JsonPart):
     """A sphere in the robot's base frame; the tool may be outside or inside of it."""
 
     schema_name: Annotated[Literal["sphere"], Field(alias="schema")] = "sphere"
@@ -34,10 +34,10 @@ def decode(source: Source) -> Sphere:
         Not JSON, another schema, a newer version, or not a centre and a radius.
     """
     remedy = f"a sphere is {FORM} in mm"
-    file = documents.validated(source, SphereFile, SCHEMA, VERSION, remedy, by_hand=True)
+    file = json_files.validated(source, SphereFile, SCHEMA, VERSION, remedy, by_hand=True)
     return Sphere(directions.near(source, "centre", file.centre), file.radius)
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of sphere files."""
-    return documents.json_schema(SphereFile, SCHEMA)
+    return json_files.json_schema(SphereFile, SCHEMA)

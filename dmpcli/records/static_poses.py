@@ -8,10 +8,10 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
-from dmpcli.records.streams import Source
-from dmpcli.rotations import from_euler, to_euler
+from dmpcli.spatial.rotations import from_euler, to_euler
 
 _RAW, _STD = suffixed(WRENCH, "raw"), suffixed(WRENCH, "std")
 _STILL = ("moved", "turned", "unsteady")

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 from dmpcli.errors import InputError
-from dmpcli.records import cylinder, documents, mesh, mesh_formats, plane, sphere
+from dmpcli.records import cylinder, json_files, mesh, mesh_formats, plane, sphere
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh import MeshFile
-from dmpcli.records.streams import Source
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
@@ -76,7 +76,7 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
     if source.content.lstrip()[:1] != b"{" or mesh_formats.is_gltf(source):
         found = mesh.decode(source, unit or "mm", "--surface-unit")
         return found if pose is None else found._replace(V=pose.apply(found.V))
-    document = documents.json_document(source)
+    document = json_files.json_document(source)
     name = kind_of(document)
     if name is None:
         said = document.get("schema")

@@ -17,7 +17,7 @@ import pyarrow as pa
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import columns, record
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 
 PARQUET_MAGIC = b"PAR1"
 

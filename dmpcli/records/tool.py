@@ -12,15 +12,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
+from dmpcli.admittance.payload_identification import Identification
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
-from dmpcli.primitives.identification import Identification
-from dmpcli.primitives.wrench import Tool
-from dmpcli.records import documents
-from dmpcli.records.documents import Part
+from dmpcli.records import json_files
+from dmpcli.records.file_io import Source
+from dmpcli.records.json_files import JsonPart
 from dmpcli.records.schemas import EULER
-from dmpcli.records.streams import Source
-from dmpcli.rotations import from_euler, to_euler
+from dmpcli.spatial.rotations import from_euler, to_euler
+from dmpcli.spatial.wrench import Tool
 from dmpcli.version import __version__
 
 SCHEMA = "tool"
@@ -34,7 +34,7 @@ Two = Annotated[list[float], Field(min_length=2, max_length=2)]
 NotNegative = Annotated[float, Field(ge=0)]
 
 
-class Transform(Part):
+class Transform(JsonPart):
     """A frame on the flange."""
 
     position: Annotated[Three, Field(description="in flange axes, mm")]
@@ -43,14 +43,14 @@ class Transform(Part):
     )
 
 
-class Zero(Part):
+class Zero(JsonPart):
     """What the sensor reads with nothing on it."""
 
     force: Annotated[Three, Field(description="N")]
     torque: Annotated[Three, Field(description="N·m")]
 
 
-class Payload(Part):
+class Payload(JsonPart):
     """What hangs on the sensor."""
 
     weight: Annotated[NotNegative, Field(description="N")]
@@ -63,7 +63,7 @@ class Payload(Part):
     )
 
 
-class SensorIdentity(Part):
+class SensorIdentity(JsonPart):
     """The sensor that the zero belongs to."""
 
     make: str
@@ -74,7 +74,7 @@ class SensorIdentity(Part):
         return " ".join(part for part in (self.make, self.product, self.serial) if part)
 
 
-class StandardErrors(Part):
+class StandardErrors(JsonPart):
     """Standard deviations of what was identified."""
 
     weight: Annotated[NotNegative, Field(description="N")]
@@ -83,7 +83,7 @@ class StandardErrors(Part):
     zero: Zero
 
 
-class Residuals(Part):
+class Residuals(JsonPart):
     """What the payload leaves of the poses' readings."""
 
     force: Annotated[NotNegative, Field(description="RMS, N")]
@@ -92,14 +92,14 @@ class Residuals(Part):
     largest_torque: Annotated[NotNegative, Field(description="N·m")]
 
 
-class Conditioning(Part):
+class Conditioning(JsonPart):
     """Condition numbers of the two least-squares systems, see docs/calibration.md."""
 
     force: Annotated[float, Field(ge=1)]
     torque: Annotated[float, Field(ge=1)]
 
 
-class Calibration(Part):
+class Calibration(JsonPart):
     """How the payload was identified."""
 
     tool: str = __version__
@@ -116,7 +116,7 @@ class Calibration(Part):
     inputs: list[dict[str, str]] = Field(default_factory=list)
 
 
-class ToolFile(Part):
+class ToolFile(JsonPart):
     """A tool on the robot's flange."""
 
     schema_name: Annotated[Literal["tool"], Field(alias="schema")] = "tool"
@@ -289,7 +289,7 @@ def _zero(six: Floats) -> Zero:
 
 
 def _read(source: Source) -> ToolFile:
-    return documents.validated(source, ToolFile, SCHEMA, VERSION, "mend the file")
+    return json_files.validated(source, ToolFile, SCHEMA, VERSION, "mend the file")
 
 
 def _geometry(file: ToolFile) -> Tool:
@@ -305,4 +305,4 @@ def _geometry(file: ToolFile) -> Tool:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of tool files."""
-    return documents.json_schema(ToolFile, SCHEMA)
+    return json_files.json_schema(ToolFile, SCHEMA)

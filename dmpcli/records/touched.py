@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import tables
+from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION
-from dmpcli.records.streams import Source
 from dmpcli.records.tables import Table
+from dmpcli.spatial import rotations
 
 PART = ("px", "py", "pz")
 APPROACH = ("ax", "ay", "az")

@@ -5,23 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.primitives.contact_heights import ContactHeights, end_heights
-from dmpcli.primitives.drawn_strokes import Block, Stroke, Style
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.skill import Skill
-from dmpcli.records import marks, schemas
+from dmpcli.dmp.contact_heights import ContactHeights, end_heights
+from dmpcli.dmp.drawn_strokes import DrawnBlock, DrawnStroke, GeneralizeOptions
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.skill import Skill
+from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
 from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
+from dmpcli.spatial import rotations
 
 LEAST_HEIGHT = 1e-9
 """A stroke that begins and ends nearer to the surface than this is on it, mm."""
 
 
 def facts_of(
-    skill: Skill, style: Style | None = None, heights: ContactHeights | None = None
+    skill: Skill, style: GeneralizeOptions | None = None, heights: ContactHeights | None = None
 ) -> dict[str, Any]:
     """Return what `execute` and `report` need of the skill that drew a trajectory.
 
@@ -29,7 +29,7 @@ def facts_of(
     ----------
     skill : Skill
         As the pairs see it; see `seen_from`.
-    style : Style, optional
+    style : GeneralizeOptions, optional
         How the strokes were drawn.
     heights : ContactHeights, optional
         What was drawn of the skill's heights over a named surface.
@@ -53,13 +53,15 @@ def facts_of(
         }
     if style is not None and skill.closed and (style.size, style.turn) != (1.0, 0.0):
         facts |= {"size": style.size, "turn": style.turn}
-    mark = marks.of_reached(skill.reached)
+    mark = tolerance_mark.of_reached(skill.reached)
     if mark is not None:
-        facts[marks.FACT] = mark
+        facts[tolerance_mark.FACT] = mark
     return facts
 
 
-def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) -> dict[str, Any]:
+def facts_of_stroke(
+    stroke: DrawnStroke, rate: float, start: Floats, goal: Floats
+) -> dict[str, Any]:
     """Return what is so for one stroke alone: its tau, ends and plane."""
     facts = {
         "tau": stroke.timing.tau,
@@ -73,7 +75,7 @@ def facts_of_stroke(stroke: Stroke, rate: float, start: Floats, goal: Floats) ->
     return facts
 
 
-def facts_of_several(stroke: Stroke, rate: float) -> dict[str, Any]:
+def facts_of_several(stroke: DrawnStroke, rate: float) -> dict[str, Any]:
     """Return what is so for all strokes of one file, of which this is one: rate and plane."""
     facts: dict[str, Any] = {"rate": rate}
     if stroke.normal is not None and len(stroke.normal) == 1:
@@ -81,14 +83,14 @@ def facts_of_several(stroke: Stroke, rate: float) -> dict[str, Any]:
     return facts
 
 
-def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenance) -> Record:
+def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Provenance) -> Record:
     """Return the record of several strokes, one after the other.
 
     Parameters
     ----------
     ids : sequence of str
         Of each stroke.
-    strokes : sequence of Stroke
+    strokes : sequence of DrawnStroke
         At least one; all with orientation or all without, all flat or all on a curved surface.
     p : Provenance
     """
@@ -109,13 +111,13 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[Stroke], p: Provenan
     return Record(schemas.TRAJECTORY, columns, p)
 
 
-def block_record(ids: Sequence[str], block: Block, p: Provenance) -> Record:
+def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record:
     """Return the record of all strokes of one block: as `trajectory_record`, without a loop.
 
     Parameters
     ----------
     ids : sequence of str, length B
-    block : Block
+    block : DrawnBlock
         All of it drawn.
     p : Provenance
     """

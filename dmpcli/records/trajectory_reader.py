@@ -11,7 +11,7 @@ from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.record import Record
-from dmpcli.rotations import from_euler
+from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.trajectory import Trajectory
 
 UNIT = 1e-3

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from annotated_types import Ge, Le
 
-from dmpcli.primitives.choices import CONDITION
+from dmpcli.dmp.options import CONDITION
 from dmpcli.settings.execute import Positive
 from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.ranges import CORNERS, Box

@@ -10,7 +10,7 @@ from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.ranges import CORNERS, Box
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.coupling import Law
+    from dmpcli.admittance.force_coupling import CouplingLaw
 
 # No product of two of them overflows.
 Positive = Annotated[float, Ge(1e-9), Le(1e9)]
@@ -96,7 +96,7 @@ class ExecuteSettings(Settings):
     coupling_patience: Positive = 0.1
     coupling_release: Positive = 10.0
 
-    def law(self, lookahead: float = 0.0) -> "Law":
+    def law(self, lookahead: float = 0.0) -> "CouplingLaw":
         """The admittance model of the force coupling.
 
         Parameters
@@ -111,8 +111,8 @@ class ExecuteSettings(Settings):
         """
         import numpy as np
 
-        from dmpcli.primitives import admittance
-        from dmpcli.primitives.coupling import Law
+        from dmpcli.admittance import model as admittance
+        from dmpcli.admittance.force_coupling import CouplingLaw
 
         if self.force_setpoint >= self.max_force:
             raise InputError(
@@ -120,14 +120,14 @@ class ExecuteSettings(Settings):
                 f"{self.max_force:g}, at which the run stops"
             )
         slow = max(lookahead / COUPLED, 1.0)
-        model = admittance.Law(
+        model = admittance.AdmittanceLaw(
             np.array([slow * self.coupling_mass]),
             np.array([slow * self.coupling_damping]),
             np.array([self.coupling_stiffness]),
             self.period,
         )
         admittance.check_stable(model, ("along the normal",))
-        return Law(
+        return CouplingLaw(
             model,
             self.force_setpoint,
             self.coupling_clamp,

@@ -5,13 +5,13 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Le
 
-from dmpcli.primitives.choices import (
+from dmpcli.dmp.options import (
     MOST,
     PAPER_BASIS,
     TOLERANCE,
     TOLERANCE_SHARE,
     Align,
-    Choices,
+    FitOptions,
     ForcingScale,
     Learning,
     Method,
@@ -43,18 +43,18 @@ def _count(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class FitSettings(Settings):
-    """How to learn; see `Choices` for what each means, and for the defaults."""
+    """How to learn; see `FitOptions` for what each means, and for the defaults."""
 
     section: ClassVar[str] = "fit"
     preset: ClassVar[str | None] = "default"
 
-    model: Annotated[Model, Option("By eq. (9)-(11), or by eq. (4)-(8).")] = Choices.model
+    model: Annotated[Model, Option("By eq. (9)-(11), or by eq. (4)-(8).")] = FitOptions.model
     forcing_scale: Annotated[
         ForcingScale,
         Option("Original model: scale by (g - x0) per axis, or by the start-goal distance."),
-    ] = Choices.forcing_scale
-    regression: Annotated[Method, Option("How the weights are found.")] = Choices.regression
-    learning: Learning = Choices.learning
+    ] = FitOptions.forcing_scale
+    regression: Annotated[Method, Option("How the weights are found.")] = FitOptions.regression
+    learning: Learning = FitOptions.learning
     basis: Annotated[
         Annotated[int, Ge(1), Le(MOST)] | Literal["auto"],
         Count(),
@@ -69,37 +69,37 @@ class FitSettings(Settings):
             "mm",
             unset=f"{TOLERANCE:g}, or {100 * TOLERANCE_SHARE:g} % of the stroke's diagonal",
         ),
-    ] = Choices.tolerance
-    passes: Annotated[int | None, Ge(1), Le(10)] = Choices.passes
+    ] = FitOptions.tolerance
+    passes: Annotated[int | None, Ge(1), Le(10)] = FitOptions.passes
     align: Annotated[
         Align, Option("How several demonstrations are laid on one another: by path, by time.")
-    ] = Choices.align
+    ] = FitOptions.align
     normal: Annotated[
         tuple[float, float, float] | None,
         Option("Normal of the plane it was taught on, to the tool.", metavar=XYZ, unset="fitted"),
-    ] = Choices.normal
-    damping: Annotated[float, Ge(0.01), Le(1000), Option("d; k = d²/4.")] = Choices.damping
+    ] = FitOptions.normal
+    damping: Annotated[float, Ge(0.01), Le(1000), Option("d; k = d²/4.")] = FitOptions.damping
     tau: Annotated[
         float, Ge(0.01), Le(100), Option("Time constant in units of the stroke's duration.")
-    ] = Choices.tau
-    alpha_1: Annotated[float, Ge(0.01), Le(100), Option("Phase constant.")] = Choices.alpha_1
-    widths: Annotated[WidthRule, Option("Width rule of the Gaussians.")] = Choices.widths
+    ] = FitOptions.tau
+    alpha_1: Annotated[float, Ge(0.01), Le(100), Option("Phase constant.")] = FitOptions.alpha_1
+    widths: Annotated[WidthRule, Option("Width rule of the Gaussians.")] = FitOptions.widths
     cutoff: Annotated[
         float | None,
         Ge(0.01),
         Le(100_000),
         Option("Low-pass before learning.", "Hz", unset="by the recording's noise"),
-    ] = Choices.cutoff
-    trim: Annotated[bool, Option("Cut off idle ends.")] = Choices.trim
+    ] = FitOptions.cutoff
+    trim: Annotated[bool, Option("Cut off idle ends.")] = FitOptions.trim
     start: Annotated[
         float | None,
         Ge(0),
         Option("Learn the recording from here on.", "s", flag="--from", unset="its beginning"),
-    ] = Choices.start
+    ] = FitOptions.start
     until: Annotated[
         float | None, Gt(0), Option("Learn the recording up to here.", "s", unset="its end")
-    ] = Choices.until
-    cut_pauses: Annotated[bool, Option("Take pauses out.")] = Choices.cut_pauses
+    ] = FitOptions.until
+    cut_pauses: Annotated[bool, Option("Take pauses out.")] = FitOptions.cut_pauses
 
     def __post_init__(self) -> None:
         """Refuse settings that fit their ranges but not each other."""
@@ -113,6 +113,6 @@ class FitSettings(Settings):
         if self.start is not None and self.until is not None and self.until <= self.start:
             raise ValueError(f"until {self.until:g} s is not after from {self.start:g} s")
 
-    def choices(self) -> Choices:
+    def choices(self) -> FitOptions:
         """Return the settings as the mathematics takes them."""
-        return Choices(**asdict(self) | {"basis": None if self.basis == "auto" else self.basis})
+        return FitOptions(**asdict(self) | {"basis": None if self.basis == "auto" else self.basis})

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from annotated_types import Ge, Le
 
-from dmpcli.primitives.choices import Amplitude, OnBorder, Orientation
+from dmpcli.dmp.options import Amplitude, OnBorder, Orientation
 from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.process import ProcessSettings
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.drawn_strokes import Style
+    from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 
 NotNegative = Annotated[float, Ge(0), Le(86_400)]
 
@@ -65,11 +65,11 @@ class GeneralizeSettings(ProcessSettings):
         bool, Option("Start and goal at any distance, however it distorts.")
     ] = False
 
-    def style(self) -> "Style":
+    def style(self) -> "GeneralizeOptions":
         """Return the settings as the mathematics takes them; heights are for the skill to tell."""
-        from dmpcli.primitives.drawn_strokes import Style
+        from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 
-        return Style(
+        return GeneralizeOptions(
             self.rate,
             self.amplitude,
             self.orientation,

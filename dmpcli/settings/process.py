@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
-from dmpcli.primitives.choices import ACCELERATION
+from dmpcli.dmp.options import ACCELERATION
 from dmpcli.settings.model import Option, Settings, settings_of
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.inclination import Inclination
-    from dmpcli.primitives.tool_speed import Pace
+    from dmpcli.dmp.inclination import Inclination
+    from dmpcli.dmp.tool_speed import Pace
 
 Leaning = Annotated[float, Ge(-80), Le(80)]
 Positive = Annotated[float, Ge(1e-3), Le(1e6)]
@@ -59,7 +59,7 @@ class ProcessSettings(Settings):
     @property
     def inclination(self) -> "Inclination | None":
         """How the tool leans; None leaves it as the skill has it."""
-        from dmpcli.primitives.inclination import Inclination
+        from dmpcli.dmp.inclination import Inclination
 
         if self.lead is None and self.tilt is None:
             return None
@@ -68,7 +68,7 @@ class ProcessSettings(Settings):
     @property
     def pace(self) -> "Pace | None":
         """How fast the tool goes; None keeps the skill's own timing."""
-        from dmpcli.primitives.tool_speed import Pace
+        from dmpcli.dmp.tool_speed import Pace
 
         if self.tool_speed is None:
             return None

@@ -10,7 +10,7 @@ from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.ranges import CORNERS, XYZ, Box, Three
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.admittance import Bounds, Law
+    from dmpcli.admittance.model import AdmittanceLaw, Bounds
 
 # Wide enough for any tool, and no product of two of them overflows.
 Coefficient = Annotated[float, Ge(-1e9), Le(1e9)]
@@ -111,13 +111,13 @@ class RecordSettings(Settings):
     periods: Annotated[float, Ge(0.01), Le(100), Option("Of the sine.")] = 1.0
 
     @property
-    def law(self) -> "Law":
+    def law(self) -> "AdmittanceLaw":
         """The admittance model at the control rate."""
         import numpy as np
 
-        from dmpcli.primitives.admittance import Law
+        from dmpcli.admittance.model import AdmittanceLaw
 
-        return Law(
+        return AdmittanceLaw(
             np.array(self.mass),
             np.array(self.damping),
             np.array(self.stiffness),
@@ -132,7 +132,7 @@ class RecordSettings(Settings):
     @property
     def bounds(self) -> "Bounds":
         """Largest speeds and accelerations of the reference."""
-        from dmpcli.primitives.admittance import Bounds
+        from dmpcli.admittance.model import Bounds
 
         return Bounds(self.speed, self.acceleration, self.turning, self.turning_acceleration)
 
@@ -146,7 +146,7 @@ def check(settings: RecordSettings) -> None:
         The admittance model is unstable or has no mass to speak of, the sensor is slower than the
         control loop, or the low-pass is above what the sensor's rate can show.
     """
-    from dmpcli.primitives.admittance import check_stable
+    from dmpcli.admittance.model import check_stable
 
     check_stable(settings.law)
     if min(settings.mass) < _LIGHTEST:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.dmp import reference_paths
 from dmpcli.errors import InputError
-from dmpcli.primitives import references
-from dmpcli.records import streams
-from dmpcli.records.streams import Source
+from dmpcli.records import file_io
+from dmpcli.records.file_io import Source
 from dmpcli.settings.record import RecordSettings
 
 AXES = ("x", "y", "z")
@@ -56,7 +56,7 @@ def build(settings: RecordSettings) -> Reference:
     """
     shape = settings.reference
     if shape.endswith(".csv"):
-        return _from_csv(streams.read(shape))
+        return _from_csv(file_io.read(shape))
     if shape not in SHAPES:
         raise InputError(
             f"--reference {shape}: no such stroke; there are {', '.join(SHAPES)}, "
@@ -69,14 +69,14 @@ def build(settings: RecordSettings) -> Reference:
     ends = {"start": [*settings.start], "goal": [*settings.goal]}
     facts: dict[str, object] = {"shape": shape, **ends}
     if shape == "line":
-        return Reference(lambda t, T: references.line(start, goal, t, T), start, normal, facts)
+        return Reference(lambda t, T: reference_paths.line(start, goal, t, T), start, normal, facts)
     if shape == "circle":
         return Reference(
-            lambda t, T: references.circle(start, goal, t, T, normal), start, normal, facts
+            lambda t, T: reference_paths.circle(start, goal, t, T, normal), start, normal, facts
         )
     facts |= {"wave_height": settings.wave_height, "periods": settings.periods}
     return Reference(
-        lambda t, T: references.sine(
+        lambda t, T: reference_paths.sine(
             start, goal, settings.wave_height, t, T, settings.periods, normal
         ),
         start,
@@ -107,7 +107,7 @@ def _from_csv(source: Source) -> Reference:
         normal = level_normal(chord)
     facts = {"shape": "polyline", "points": len(points)}
     return Reference(
-        lambda t, T: references.polyline(points, t, T), points[0], normal, facts, source
+        lambda t, T: reference_paths.polyline(points, t, T), points[0], normal, facts, source
     )
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import AnyArray, Floats
+from dmpcli.spatial import rotations
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces import unfolding
+from dmpcli.spatial.vectors import across, cross, length
+from dmpcli.surfaces import straightest_geodesics
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.vectors import across, cross, length
 
 if TYPE_CHECKING:
     from igl import AABB
@@ -103,4 +103,4 @@ class BorderMargin:
     def _meets(self, foot: Floats, heading: Floats) -> Booleans:
         """Tell which geodesics of the margin's length meet the border."""
         lengths = np.full(foot.shape[:-1], self.margin - _JUST)
-        return ~unfolding.walk(self.mesh, foot, heading, lengths).arrived
+        return ~straightest_geodesics.walk(self.mesh, foot, heading, lengths).arrived

@@ -21,7 +21,7 @@ The facets of round meshes alone give 0.001 to 0.008; rocking on a saddle of rad
 
 
 @dataclass(frozen=True)
-class Conditioning:
+class PointConditioning:
     """How well touched points hold a part.
 
     Attributes
@@ -78,14 +78,14 @@ class Conditioning:
         )
 
 
-def conditioning_of(points: Floats, normals: Floats, touched: int) -> Conditioning:
+def conditioning_of(points: Floats, normals: Floats, touched: int) -> PointConditioning:
     """Gains of rows of points and normals (k, 3) that came from this many touched points."""
     centre = points.mean(axis=0)
     arms = points - centre
     radius = radius_of(arms)
     rows = np.concatenate([normals, np.cross(arms, normals) / radius], axis=1)
     _, gains, motions = np.linalg.svd(rows / np.sqrt(touched), full_matrices=False)
-    return Conditioning(gains, motions, centre, radius)
+    return PointConditioning(gains, motions, centre, radius)
 
 
 def radius_of(arms: Floats) -> float:
@@ -96,7 +96,7 @@ def radius_of(arms: Floats) -> float:
     return radius
 
 
-def refuse_unseen(of: Conditioning, advice: str) -> None:
+def refuse_unseen(of: PointConditioning, advice: str) -> None:
     """Refuse, by name, points that leave the part free to move."""
     free = of.free()
     if free:

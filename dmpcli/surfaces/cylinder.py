@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.surfaces.protocol import Connections, Hits, Status, Walks
-from dmpcli.surfaces.vectors import any_tangent, cross, dot, length, unit
-from dmpcli.surfaces.walked import WalkedCharts, walked_charts
+from dmpcli.spatial.vectors import any_tangent, cross, dot, length, unit
+from dmpcli.surfaces.sampled_chart import WalkedCharts, walked_charts
+from dmpcli.surfaces.surface import ClosestPoints, Connections, Geodesics, Status
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Cylinder:
     axis: Floats
     radius: float
 
-    def closest(self, points: Floats) -> Hits:
+    def closest(self, points: Floats) -> ClosestPoints:
         """Closest points, see `Surface`; on the axis itself, some point beside it."""
         offset = np.asarray(points, dtype=float) - self.point
         height = dot(offset, self.axis)
@@ -36,14 +36,14 @@ class Cylinder:
         off_axis = length(radial)
         normal = np.where(off_axis > 0.0, unit(radial), any_tangent(self.axis))
         position = self.point + height * self.axis + self.radius * normal
-        return Hits(
+        return ClosestPoints(
             position,
             normal,
             np.abs(off_axis[..., 0] - self.radius),
             np.full(position.shape[:-1], -1),
         )
 
-    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Walks:
+    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Geodesics:
         """Walk helices, see `Surface`."""
         normal = self.closest(origin).normal
         around = cross(self.axis, normal)
@@ -57,7 +57,7 @@ class Cylinder:
         after, tangent = c * normal + s * around, c * around - s * normal
         position = origin + self.radius * (after - normal) + way[..., 1:] * self.axis
         heading = along[..., :1] * tangent + along[..., 1:] * self.axis
-        return Walks(position, heading, after, np.ones(position.shape[:-1], dtype=bool))
+        return Geodesics(position, heading, after, np.ones(position.shape[:-1], dtype=bool))
 
     def connect(self, start: Floats, goal: Floats) -> Connections:
         """Shortest helices, see `Surface`."""

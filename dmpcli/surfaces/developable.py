@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.vectors import cross, dot, length
+from dmpcli.spatial.vectors import cross, dot, length
 
 # A facet is a sliver if its longest edge is so many times its height over that edge.
 _SLENDER = 5.0

@@ -3,8 +3,8 @@
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.spatial.vectors import cross, dot, length
 from dmpcli.surfaces.topology import Topology
-from dmpcli.surfaces.vectors import cross, dot, length
 
 
 def area(V: Floats, F: Integers) -> float:

@@ -10,10 +10,10 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError
+from dmpcli.spatial.vectors import any_tangent, cross, unit
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
-from dmpcli.surfaces.vectors import any_tangent, cross, unit
 
 _AT_ONCE = 1 << 21
 # Cosine of the largest angle from the middle of a sphere's region, near a right one.

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.plane import PlaneCharts
-from dmpcli.surfaces.protocol import Charts, Status
+from dmpcli.surfaces.surface import Charts, Status
 from dmpcli.surfaces.tangential import NEAR, Sought, solved
 
 ASTRAY = NEAR

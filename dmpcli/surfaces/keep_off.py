@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.protocol import LEAVES, Status, first_refusal
+from dmpcli.surfaces.surface import LEAVES, Status, first_refusal
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.border_margin import BorderMargin

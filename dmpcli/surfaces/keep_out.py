@@ -8,8 +8,8 @@ from dmpcli.surfaces.keep_off import Region
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.mesh_regions import mesh_region
 from dmpcli.surfaces.plane import Plane
-from dmpcli.surfaces.protocol import Surface
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Surface
 
 
 def enclosed(surface: Surface, line: Floats) -> Region:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.protocol import Status
+from dmpcli.spatial.vectors import dot, length
+from dmpcli.surfaces.surface import Status
 from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
-from dmpcli.surfaces.vectors import dot, length
 
 # Start and goal are met within this, mm, and within the noise of the mesh there, which tilts its
 # facets; a geodesic may be so much shorter than its chord.

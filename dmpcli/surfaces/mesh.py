@@ -3,16 +3,16 @@
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.surfaces import charts
-from dmpcli.surfaces.nodes import Centre
-from dmpcli.surfaces.protocol import Connections, Status, Walks
+from dmpcli.surfaces import mesh_charts as charts
+from dmpcli.surfaces.strip_grid import Centre
+from dmpcli.surfaces.surface import Connections, Geodesics, Status
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 
 class Mesh(TriangleMesh):
     """A triangle mesh in the robot's base frame, to draw on; see `TriangleMesh` and `Surface`."""
 
-    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Walks:
+    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Geodesics:
         """Walk geodesics, see `Surface`."""
         return charts.walk(self, origin, direction, length)
 

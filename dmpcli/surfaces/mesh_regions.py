@@ -12,8 +12,8 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.spatial.vectors import cross, dot, length, unit
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.vectors import cross, dot, length, unit
 
 _MOST_FACETS = 20_000
 # Points are moved off edges and vertices by this part of the way to the facet's middle.

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.optimize import least_squares
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.conditioning import radius_of
 from dmpcli.surfaces.pose_bound import LEAST_NOISE

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.spatial import rotations
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Surface
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Surface
 
 
 @dataclass(frozen=True)

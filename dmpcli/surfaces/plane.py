@@ -9,8 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.protocol import Connections, Hits, Lift, Status, Walks, towards
-from dmpcli.surfaces.vectors import across, dot, length, turned, unit
+from dmpcli.spatial.vectors import across, dot, length, turned, unit
+from dmpcli.surfaces.surface import (
+    ChartImage,
+    ClosestPoints,
+    Connections,
+    Geodesics,
+    Status,
+    towards,
+)
 
 # A stroke this close to its start-goal line, by its extent, does not tell its plane.
 STRAIGHT = 1e-3
@@ -49,20 +56,20 @@ class Plane:
         height: Floats = (np.asarray(position, dtype=float) - self.point) @ self.normal
         return height
 
-    def closest(self, points: Floats) -> Hits:
+    def closest(self, points: Floats) -> ClosestPoints:
         """Feet of the perpendiculars, see `Surface`."""
         height = self.height(points)
         position = np.asarray(points, dtype=float) - height[..., None] * self.normal
         normal = np.broadcast_to(self.normal, position.shape)
-        return Hits(position, normal, np.abs(height), np.full(height.shape, -1))
+        return ClosestPoints(position, normal, np.abs(height), np.full(height.shape, -1))
 
-    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Walks:
+    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Geodesics:
         """Walk straight lines, see `Surface`."""
         heading = across(direction, self.normal)
         position = origin + np.asarray(length, dtype=float)[..., None] * heading
         normal = np.broadcast_to(self.normal, position.shape)
         heading = np.broadcast_to(heading, position.shape)
-        return Walks(position, heading, normal, np.ones(position.shape[:-1], dtype=bool))
+        return Geodesics(position, heading, normal, np.ones(position.shape[:-1], dtype=bool))
 
     def connect(self, start: Floats, goal: Floats) -> Connections:
         """Straight lines, see `Surface`."""
@@ -145,11 +152,11 @@ class PlaneCharts:
         """All of points (B, T, 3): there is no border."""
         return np.ones(points.shape[:2], dtype=bool)
 
-    def lift(self, coordinates: Floats) -> Lift:
+    def lift(self, coordinates: Floats) -> ChartImage:
         """Carry chart coordinates (B, T, 3), mm, to the plane: one rigid transform per pair."""
         position = self.origin[:, None] + coordinates @ np.swapaxes(self.axes, -1, -2)
         samples = coordinates.shape[:2]
-        return Lift(
+        return ChartImage(
             position,
             np.broadcast_to(self.axes[:, None], (*samples, 3, 3)),
             np.zeros(samples, dtype=bool),

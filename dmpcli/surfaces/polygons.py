@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.vectors import cross, dot, length
+from dmpcli.spatial.vectors import cross, dot, length
 
 LARGEST = 20_000
 """Corners. The work of clipping ears can grow with their square: a comb of so many takes 4 s."""

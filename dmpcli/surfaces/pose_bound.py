@@ -12,10 +12,10 @@ count as the ellipsoid does.
 import numpy as np
 from scipy.special import fdtri
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
-from dmpcli.surfaces.conditioning import Conditioning
+from dmpcli.surfaces.conditioning import PointConditioning
 from dmpcli.surfaces.pose_search import Closest, descended
 
 LIKELY, SURE = 0.95, 0.999
@@ -58,13 +58,13 @@ def displacement(of: Pose, one: Pose, extreme: Floats) -> Floats:
 
 
 def ellipsoid(
-    conditioning: Conditioning, points: int, squares: float, spare: int, at: Floats
+    conditioning: PointConditioning, points: int, squares: float, spare: int, at: Floats
 ) -> float:
     """Bound on the displacement at any of some points, with the curvature at the best fit.
 
     Parameters
     ----------
-    conditioning : Conditioning
+    conditioning : PointConditioning
     points : int
         How many were touched.
     squares : float
@@ -91,7 +91,7 @@ def beside(
     touched: Floats,
     closest: Closest,
     best: Pose,
-    conditioning: Conditioning,
+    conditioning: PointConditioning,
     extreme: Floats,
     limit: float,
 ) -> tuple[Pose, Floats]:
@@ -104,7 +104,7 @@ def beside(
     closest : callable
     best : Pose
         One.
-    conditioning : Conditioning
+    conditioning : PointConditioning
         At it.
     extreme : array, shape (m, 3)
         See `displacement`.
@@ -128,7 +128,7 @@ def beside(
     return descended(touched, closest, starts, _STEPS, np.tile(motions, (len(_TRIED), 1)))
 
 
-def _moved(motions: Floats, at: Floats, conditioning: Conditioning) -> Floats:
+def _moved(motions: Floats, at: Floats, conditioning: PointConditioning) -> Floats:
     """Displacements (m, 3, k) of points (m, 3) by motions (v, ω·radius), the columns (6, k)."""
     arms = (at - conditioning.centre)[:, :, None] / conditioning.radius
     turned = np.cross(motions[None, 3:], arms, axis=1)

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats, Integers
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.conditioning import radius_of
 

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
-from dmpcli import rotations
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import pose_bound, pose_search
 from dmpcli.surfaces.conditioning import (
-    Conditioning,
+    PointConditioning,
     conditioning_of,
     radius_of,
     refuse_unseen,
@@ -99,7 +99,7 @@ class Registration:
         mm.
     residual : array, shape (n,)
         Distance of each touched point from its pair, or from the surface, mm.
-    conditioning : Conditioning
+    conditioning : PointConditioning
     spare : int
         Degrees of freedom that are left to the residuals.
     uncertainty : float
@@ -116,7 +116,7 @@ class Registration:
     rotation: Floats
     position: Floats
     residual: Floats
-    conditioning: Conditioning
+    conditioning: PointConditioning
     spare: int
     uncertainty: float
     rival: Rival | None = None
@@ -175,7 +175,7 @@ def from_pairs(part: Floats, touched: Floats, extreme: Floats | None = None) -> 
 
 
 @dataclass(frozen=True)
-class Part:
+class RegisteredPart:
     """What registration asks of a part, in its own frame.
 
     Attributes
@@ -193,7 +193,7 @@ class Part:
     places: Floats
 
     @classmethod
-    def of(cls, surface: "Mesh") -> "Part":
+    def of(cls, surface: "Mesh") -> "RegisteredPart":
         """Return a mesh as registration asks of it."""
 
         def closest(points: Floats) -> tuple[Floats, Floats]:
@@ -219,7 +219,7 @@ def starts_near(touched: Floats, rotation: Floats, position: Floats) -> Pose:
     return pose_search.near(rotation, position, centre, STARTS, START_SHIFT, START_TURN)
 
 
-def starts_anywhere(touched: Floats, part: Part) -> Pose:
+def starts_anywhere(touched: Floats, part: RegisteredPart) -> Pose:
     """Return starts in all orientations, with the middle of the touched points in the part's."""
     middles = [
         part.places.mean(axis=0),
@@ -232,7 +232,7 @@ def starts_anywhere(touched: Floats, part: Part) -> Pose:
 
 def onto_surface(
     touched: Floats,
-    part: Part,
+    part: RegisteredPart,
     starts: Pose,
     approach: Floats | None = None,
     limit: float = LIMIT,
@@ -243,7 +243,7 @@ def onto_surface(
     ----------
     touched : array, shape (n, 3)
         Base frame, mm.
-    part : Part
+    part : RegisteredPart
     starts : Pose
         Of `starts_near` or `starts_anywhere`.
     approach : array, shape (n, 3), optional
@@ -324,7 +324,7 @@ def _one_sided(distance: Floats) -> float:
     return middle if abs(middle) > sure else 0.0
 
 
-def _refuse_size(touched: Floats, part: Part) -> None:
+def _refuse_size(touched: Floats, part: RegisteredPart) -> None:
     across = float(np.linalg.norm(np.ptp(touched, axis=0)))
     # No distance between two points of the part is larger than its box's diagonal.
     most = float(np.linalg.norm(np.ptp(part.extreme, axis=0)))
@@ -336,19 +336,19 @@ def _refuse_size(touched: Floats, part: Part) -> None:
         )
 
 
-def _beside(touched: Floats, part: Part, best: Pose, limit: float) -> tuple[Pose, Floats]:
+def _beside(touched: Floats, part: RegisteredPart, best: Pose, limit: float) -> tuple[Pose, Floats]:
     conditioning = _conditioning_at(touched, part, best)
     return pose_bound.beside(touched, part.closest, best, conditioning, part.extreme, limit)
 
 
-def _conditioning_at(touched: Floats, part: Part, pose: Pose) -> Conditioning:
+def _conditioning_at(touched: Floats, part: RegisteredPart, pose: Pose) -> PointConditioning:
     _, normal = part.closest(pose.apply_inverse(touched)[0])
     return conditioning_of(touched, normal @ pose.rotation[0].T, len(touched))
 
 
 def _directed(
     touched: Floats,
-    part: Part,
+    part: RegisteredPart,
     poses: Pose,
     squares: Floats,
     approach: Floats | None,
@@ -372,7 +372,7 @@ def _directed(
     return cost, True
 
 
-def _rival(part: Part, best: Pose, other: Pose, rms: float, near: bool) -> Rival:
+def _rival(part: RegisteredPart, best: Pose, other: Pose, rms: float, near: bool) -> Rival:
     places = best.apply(part.places)[0]
     off = np.abs(pose_search.signed(other.apply_inverse(places), part.closest)[0][0])
     worst = int(np.argmax(off))

@@ -3,9 +3,9 @@
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.surfaces import unfolding
+from dmpcli.spatial.vectors import length
+from dmpcli.surfaces import straightest_geodesics
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
-from dmpcli.surfaces.vectors import length
 
 # Points this near to such an edge, mm, are on it, on either side: the ways past them are looked at.
 _ON = 1e-3
@@ -40,7 +40,7 @@ def crossed(mesh: TriangleMesh, foot: Floats) -> Booleans:
     some = np.flatnonzero(sure.reshape(-1) & near & (size > 0.0))
     if len(some) == 0:
         return crossed
-    end = unfolding.walk(mesh, p[some], way[some], size[some])
+    end = straightest_geodesics.walk(mesh, p[some], way[some], size[some])
     stopped = ~end.arrived
     stopped[stopped] = slits.off(end.position[stopped]) <= _ON
     hit = np.zeros(len(p), dtype=bool)

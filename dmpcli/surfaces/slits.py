@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dmpcli.arrays import Booleans, Floats
+from dmpcli.spatial.vectors import dot, length
 from dmpcli.surfaces.topology import Topology, places
-from dmpcli.surfaces.vectors import dot, length
 
 # Edges are looked for by points on them that are no farther apart than this, mm.
 _SPACING = 2.0

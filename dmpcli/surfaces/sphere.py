@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.surfaces.protocol import Connections, Hits, Status, Walks
-from dmpcli.surfaces.vectors import across, cross, dot, length, unit
-from dmpcli.surfaces.walked import WalkedCharts, walked_charts
+from dmpcli.spatial.vectors import across, cross, dot, length, unit
+from dmpcli.surfaces.sampled_chart import WalkedCharts, walked_charts
+from dmpcli.surfaces.surface import ClosestPoints, Connections, Geodesics, Status
 
 # Opposite points within this part of the radius have no one shortest way between them.
 OPPOSITE = 1e-6
@@ -28,20 +28,20 @@ class Sphere:
     centre: Floats
     radius: float
 
-    def closest(self, points: Floats) -> Hits:
+    def closest(self, points: Floats) -> ClosestPoints:
         """Closest points, see `Surface`; to the centre itself, the topmost point."""
         offset = np.asarray(points, dtype=float) - self.centre
         distance = length(offset)
         normal = np.where(distance > 0.0, unit(offset), np.eye(3)[2])
         position = self.centre + self.radius * normal
-        return Hits(
+        return ClosestPoints(
             position,
             normal,
             np.abs(distance[..., 0] - self.radius),
             np.full(position.shape[:-1], -1),
         )
 
-    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Walks:
+    def walk(self, origin: Floats, direction: Floats, length: Floats) -> Geodesics:
         """Walk great circles, see `Surface`."""
         normal = unit(origin - self.centre)
         heading = across(direction, normal)
@@ -49,7 +49,7 @@ class Sphere:
         c, s = np.cos(angle), np.sin(angle)
         after = c * normal + s * heading
         position = origin + self.radius * (after - normal)
-        return Walks(
+        return Geodesics(
             position, c * heading - s * normal, after, np.ones(position.shape[:-1], dtype=bool)
         )
 

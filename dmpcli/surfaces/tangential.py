@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.protocol import Charts
+from dmpcli.surfaces.surface import Charts
 
 SETTLED = 1e-6
 """A foot is found when what is left of the gap along the surface is less than this, mm."""
@@ -111,7 +111,7 @@ def solved(
     Sought
         `good` counts for samples that are free.
     """
-    state = _State(charts, position, np.array(at, dtype=float), free, box)
+    state = _NewtonState(charts, position, np.array(at, dtype=float), free, box)
     for _ in range(_MOST_STEPS):
         live = state.live()
         if len(live) == 0:
@@ -120,7 +120,7 @@ def solved(
     return state.best
 
 
-class _State:
+class _NewtonState:
     """The search, of all strokes."""
 
     def __init__(

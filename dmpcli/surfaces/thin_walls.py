@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.surfaces import all_headings
-from dmpcli.surfaces.vectors import dot, length
+from dmpcli.spatial.vectors import dot, length
+from dmpcli.surfaces import geodesic_search
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.triangle_mesh import TriangleMesh
@@ -52,6 +52,6 @@ def mistaken(
     rows = np.flatnonzero((thin & (sideways <= 0.5 * limit))[:, 0])
     mistaken = np.zeros(len(goal), dtype=bool)
     if len(rows):
-        _, near, found = all_headings.find(mesh, origin[rows], behind[rows])
+        _, near, found = geodesic_search.find(mesh, origin[rows], behind[rows])
         mistaken[rows] = found & (near < lengths[rows])
     return mistaken

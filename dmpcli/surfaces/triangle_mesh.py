@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.surfaces.protocol import Hits
-from dmpcli.surfaces.roughness import averaged, noise
+from dmpcli.spatial.vectors import across, cross, dot, length, unit
+from dmpcli.surfaces.mesh_noise import averaged, noise
+from dmpcli.surfaces.surface import ClosestPoints
 from dmpcli.surfaces.topology import Topology
-from dmpcli.surfaces.vectors import across, cross, dot, length, unit
 
 if TYPE_CHECKING:
     from igl import AABB
@@ -220,7 +220,7 @@ class TriangleMesh:
 
     @cached_property
     def _heights(self) -> Floats:
-        from dmpcli.surfaces.chordal import heights
+        from dmpcli.surfaces.chordal_error import heights
 
         return heights(self.V, self.F, self.topology)
 
@@ -254,13 +254,13 @@ class TriangleMesh:
         local = position - self._middle
         return unit(np.einsum("nij,nj->ni", maps[..., :3], local) + maps[..., 3])
 
-    def closest(self, points: Floats) -> Hits:
+    def closest(self, points: Floats) -> ClosestPoints:
         """Closest points with smooth normals, see `Surface`."""
         points = np.asarray(points, dtype=float)
         position, face = self.search(points.reshape(-1, 3))
         normal = self.smooth_normals(position, face)
         position = position.reshape(points.shape)
-        return Hits(
+        return ClosestPoints(
             position,
             normal.reshape(points.shape),
             length(points - position)[..., 0],

@@ -3,14 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
-from dmpcli.batch.job import Job
+from dmpcli.batch.part import Job
 from dmpcli.batch.run import Batch, Shard, Summary
 from dmpcli.batch.workers import Draw
+from dmpcli.dmp.feasibility import snapped
+from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
 from dmpcli.messages import progress, tell, warn
-from dmpcli.primitives.admission import snapped
-from dmpcli.primitives.drawing import draw, seen_from
-from dmpcli.records import streams, trajectory
+from dmpcli.records import file_io, trajectory
 from dmpcli.records.pairs import OK, PairTable
 from dmpcli.records.record import Form
 from dmpcli.settings.batch import BatchOptions
@@ -78,7 +78,7 @@ def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> Non
         tell(f"{table.name}: skipped: {status}")
     if len(bad) > SHOWN:
         more = f"{table.name}: and {len(bad) - SHOWN} more"
-        tell(f"{more}; {output}/{streams.TABLE} names all" if shard.whole else more)
+        tell(f"{more}; {output}/{file_io.TABLE} names all" if shard.whole else more)
     if not shard.whole:
         tell(
             f"{output}: shard {shard.index}/{shard.count}: {counted(summary.drawn, 'stroke')} "
@@ -88,7 +88,7 @@ def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> Non
         return
     if len(bad) == len(table):
         raise RefusedError(
-            f"{table.name}: no pair can be drawn, {output}/{streams.TABLE} says why of each; move "
+            f"{table.name}: no pair can be drawn, {output}/{file_io.TABLE} says why of each; move "
             "the pairs"
         )
     drawn = len(table) - len(bad)

@@ -3,17 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dmpcli.dmp.fit_result import Fit
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.skill import TaughtSurface
+from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError, about
 from dmpcli.messages import warn
-from dmpcli.primitives.fit_result import Fit
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.skill import TaughtSurface
-from dmpcli.primitives.smoothing import Stroke
 from dmpcli.records import learned_skill, skill
+from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance
-from dmpcli.records.streams import Source
 from dmpcli.settings.fit import FitSettings
 from dmpcli.workflows.fit_messages import cautions
 from dmpcli.workflows.surface_input import SurfaceInput
@@ -42,7 +42,7 @@ def check_said(said: Mapping[str, Any], on_surface: bool) -> None:
 
 def learn(
     sources: Sequence[Source],
-    strokes: Sequence[Stroke],
+    strokes: Sequence[SmoothedStroke],
     settings: FitSettings,
     form: Layout | None = None,
     on: SurfaceInput | None = None,
@@ -53,7 +53,7 @@ def learn(
     ----------
     sources : sequence of Source
         The recordings' files.
-    strokes : sequence of Stroke
+    strokes : sequence of SmoothedStroke
         What was read of them.
     settings : FitSettings
     form : Layout, optional

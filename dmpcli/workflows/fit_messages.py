@@ -5,17 +5,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dmpcli.dmp.options import MOST
+from dmpcli.dmp.stroke_plane import LEANING
 from dmpcli.errors import counted
-from dmpcli.primitives.choices import MOST
-from dmpcli.primitives.stroke_plane import LEANING
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.alignment import Alignment
-    from dmpcli.primitives.fit_result import Fit, Reproduction
-    from dmpcli.primitives.preparation import Prepared
-    from dmpcli.primitives.preprocessing import Preprocessed
-    from dmpcli.primitives.skill import Skill
-    from dmpcli.primitives.stroke_plane import StrokePlane
+    from dmpcli.dmp.alignment import Alignment
+    from dmpcli.dmp.fit_result import Fit, ReproductionMeasures
+    from dmpcli.dmp.paper_preprocessing import Prepared
+    from dmpcli.dmp.preprocessing import Preprocessed
+    from dmpcli.dmp.skill import Skill
+    from dmpcli.dmp.stroke_plane import StrokePlane
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 # Share of a stroke's extent beyond which the paper's learning is told to fail.
@@ -72,7 +72,7 @@ def _taught(skill: "Skill", plane: "StrokePlane | None") -> str:
     return f", normal {n}"
 
 
-def _reproduced(prepared: "Prepared", r: "Reproduction") -> str:
+def _reproduced(prepared: "Prepared", r: "ReproductionMeasures") -> str:
     before, after = prepared.trimmed
     smoothing = "not smoothed"
     if prepared.cutoff is not None:
@@ -84,9 +84,9 @@ def _reproduced(prepared: "Prepared", r: "Reproduction") -> str:
     )
 
 
-def _wave(r: "Reproduction") -> tuple[float, float] | None:
+def _wave(r: "ReproductionMeasures") -> tuple[float, float] | None:
     """Return the wave heights across the demonstrated start-goal line; None for a line."""
-    from dmpcli.measures.wave import stroke_wave
+    from dmpcli.metrics.wave_height import stroke_wave
 
     up = np.array([0.0, 0.0, 1.0])
     ends = r.demonstrated[0], r.demonstrated[-1]

@@ -7,18 +7,18 @@ from typing import Any, Literal
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.batch.job import Task
+from dmpcli.batch.part import Task
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions, OnBorder
+from dmpcli.dmp.feasibility import admit
+from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.messages import tell, warn
-from dmpcli.primitives.admission import admit
-from dmpcli.primitives.drawn_strokes import OnBorder, Style
-from dmpcli.primitives.skill import Skill
-from dmpcli.records import lesson
+from dmpcli.records import learning_record
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.settings.generalize import GeneralizeSettings
-from dmpcli.surfaces.protocol import Surface
+from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
     ENDS,
@@ -134,7 +134,7 @@ def prepared(order: Order) -> Ready:
     if given is not None and read is not None:
         tell_of_surface(skill, style, given, table, str(read.path))
     _judge(order, table, given, style)
-    taught = lesson.of_skill(skill.file).facts()
+    taught = learning_record.of_skill(skill.file).facts()
     return Ready(
         Task(skill.plain(), given, style, reach),
         table,
@@ -167,7 +167,7 @@ def _check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -
         )
 
 
-def _judge(order: Order, table: PairTable, given: Surface | None, style: Style) -> None:
+def _judge(order: Order, table: PairTable, given: Surface | None, style: GeneralizeOptions) -> None:
     """Write what stands against a pair into its status; with `stop` the first one ends all."""
     import numpy as np
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
-    from dmpcli.primitives.contact_heights import ContactHeights
-    from dmpcli.primitives.drawn_strokes import Style
-    from dmpcli.primitives.reach import Reach
-    from dmpcli.primitives.skill import Skill
+    from dmpcli.dmp.contact_heights import ContactHeights
+    from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+    from dmpcli.dmp.skill import Skill
+    from dmpcli.kinematics.reachability import Reach
     from dmpcli.records.pairs import PairTable
-    from dmpcli.surfaces.protocol import Surface
+    from dmpcli.surfaces.surface import Surface
     from dmpcli.workflows.surface_input import SurfaceInput
 
 Point = tuple[float, float, float]
@@ -27,9 +27,9 @@ def one_pair(
     """Return a table of one pair."""
     import numpy as np
 
-    from dmpcli import rotations
-    from dmpcli.primitives.generalization import Pairs
+    from dmpcli.dmp.rollout import Pairs
     from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
+    from dmpcli.spatial import rotations
     from dmpcli.workflows.pose_hints import warn_of_angles
     from dmpcli.workflows.ranges import within
 
@@ -61,7 +61,7 @@ def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
 
     import numpy as np
 
-    from dmpcli.primitives.generalization import Pairs
+    from dmpcli.dmp.rollout import Pairs
 
     pose = None if read is None else read.pose
     if pose is None:
@@ -97,8 +97,8 @@ def where_instead(
 
 def facing_tool(surface: "Surface", skill: "Skill", table: "PairTable", name: str) -> "Surface":
     """Turn a plane's normal to the tool's side, and say so where that flips it."""
+    from dmpcli.dmp.feasibility import tool_axis
     from dmpcli.messages import tell
-    from dmpcli.primitives.admission import tool_axis
     from dmpcli.surfaces.plane import Plane
 
     if not isinstance(surface, Plane):
@@ -124,9 +124,9 @@ def reach_of(
         The model is not known, the tool file is wrong, or there is a tool and no arm.
     """
     from dmpcli.kinematics import models
+    from dmpcli.kinematics.reachability import Reach
     from dmpcli.messages import tell
-    from dmpcli.primitives.reach import Reach
-    from dmpcli.records import streams
+    from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
 
     if model is None:
@@ -143,18 +143,22 @@ def reach_of(
     if tool is None:
         tell("no --tool: the flange is taken as the TCP")
         return Reach(arm)
-    source = streams.read(tool)
+    source = file_io.read(tool)
     inputs.append({"role": "tool", "sha256": source.sha256})
     return Reach(arm, tool_file.geometry(source))
 
 
 def style_of(
-    style: "Style", skill: "Skill", given: "Surface | None", contact: float | None, offset: float
-) -> "Style":
+    style: "GeneralizeOptions",
+    skill: "Skill",
+    given: "Surface | None",
+    contact: float | None,
+    offset: float,
+) -> "GeneralizeOptions":
     """Return the style with what is drawn of the skill's heights over a named surface."""
     from dataclasses import replace
 
-    from dmpcli.primitives.contact_heights import contact_heights
+    from dmpcli.dmp.contact_heights import contact_heights
 
     if given is None or skill.model == "original" or skill.learning != "tolerance":
         return style

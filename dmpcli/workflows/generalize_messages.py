@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats, Integers
-    from dmpcli.primitives.admission import Admission
-    from dmpcli.primitives.drawn_strokes import Style
-    from dmpcli.primitives.skill import Skill
+    from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+    from dmpcli.dmp.feasibility import Feasibility
+    from dmpcli.dmp.skill import Skill
     from dmpcli.records.pairs import PairTable
-    from dmpcli.surfaces.protocol import Surface
+    from dmpcli.surfaces.surface import Surface
 
 _SHOWN_OFFSET = 0.05
 _UNDECIDED = 5.0
@@ -17,14 +17,14 @@ _UNDECIDED = 5.0
 
 def mark(skill: "Skill", name: str) -> str | None:
     """Return the warning that a skill beyond its tolerance carries; None of a good one."""
-    from dmpcli.records import marks
+    from dmpcli.records import tolerance_mark
 
-    found = marks.of_reached(skill.reached)
-    return None if found is None else marks.text(name, found)
+    found = tolerance_mark.of_reached(skill.reached)
+    return None if found is None else tolerance_mark.text(name, found)
 
 
 def reason(
-    verdict: "Admission",
+    verdict: "Feasibility",
     i: int,
     tolerance: float,
     skill: "Skill",
@@ -34,7 +34,7 @@ def reason(
 
     Parameters
     ----------
-    verdict : Admission
+    verdict : Feasibility
     i : int
         Of the pair.
     tolerance : float
@@ -43,7 +43,7 @@ def reason(
     where : callable, optional
         Says of the ends that are off the surface where it is instead.
     """
-    from dmpcli.primitives.admission import MOST_SAMPLES
+    from dmpcli.dmp.feasibility import MOST_SAMPLES
     from dmpcli.workflows import off_surface
 
     if verdict.coincident[i]:
@@ -84,11 +84,11 @@ def reason(
 
 
 def tell_of_surface(
-    skill: "Skill", style: "Style", given: "Surface", table: "PairTable", name: str
+    skill: "Skill", style: "GeneralizeOptions", given: "Surface", table: "PairTable", name: str
 ) -> None:
     """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over."""
+    from dmpcli.dmp.sides import turned_over
     from dmpcli.messages import tell, warn
-    from dmpcli.primitives.sides import turned_over
 
     pairs = table.pairs[table.good.nonzero()[0]]
     start = pairs.start
@@ -122,8 +122,8 @@ def tell_of_surface(
 def _tell_of_guessed_side(skill: "Skill", given: "Surface", start: "Floats", name: str) -> None:
     import numpy as np
 
+    from dmpcli.dmp.sides import normals_at
     from dmpcli.messages import tell, warn
-    from dmpcli.primitives.sides import normals_at
 
     if not len(start):
         return
@@ -148,8 +148,8 @@ def _tell_of_taught_side(skill: "Skill", given: "Surface", start: "Floats", name
     """
     import numpy as np
 
+    from dmpcli.dmp.sides import taught_side
     from dmpcli.messages import tell, warn
-    from dmpcli.primitives.sides import taught_side
     from dmpcli.surfaces.plane import Plane
 
     side = None if isinstance(given, Plane) else taught_side(skill, given, start)
@@ -170,10 +170,10 @@ def _tell_of_taught_side(skill: "Skill", given: "Surface", start: "Floats", name
         )
 
 
-def tell_of_stretch(verdict: "Admission", rows: "Integers", skill: "Skill", table: str) -> None:
+def tell_of_stretch(verdict: "Feasibility", rows: "Integers", skill: "Skill", table: str) -> None:
     """Warn of strokes whose start-goal distance is far from the demonstrated one."""
+    from dmpcli.dmp.feasibility import LONG_STRETCH, nearly_closed
     from dmpcli.messages import warn
-    from dmpcli.primitives.admission import LONG_STRETCH, nearly_closed
 
     stretch = verdict.stretch[rows]
     far = (stretch > LONG_STRETCH) | (stretch < 1.0 / LONG_STRETCH)

@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmpcli.arrays import Floats
+from dmpcli.dmp.drawn_strokes import OnBorder
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
-from dmpcli.primitives.drawn_strokes import OnBorder
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.skill import Skill
-from dmpcli.records import learned_skill, record, recordings, schemas, streams
+from dmpcli.records import file_io, learned_skill, record, recordings, schemas
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import FARTHEST, OK, PairTable
-from dmpcli.rotations import to_euler
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.fit import FitSettings
 from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.settings.layers import resolve
 from dmpcli.settings.options import Given
 from dmpcli.settings.recording import RecordingOptions
+from dmpcli.spatial.rotations import to_euler
 from dmpcli.spatial.trajectory import Trajectory
-from dmpcli.surfaces.protocol import Surface
+from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import batches, process, single, surface_input, values
 from dmpcli.workflows.fit import check_said, learn
 from dmpcli.workflows.generalize import Order, prepared
@@ -63,7 +63,7 @@ def read(path: str | Path, **said: Any) -> Any:
     """
     if Path(path).is_dir():
         return values.batch_in(Path(path))
-    source = streams.read(path)
+    source = file_io.read(path)
     if source.content.lstrip()[:1] == b"{":
         return learned_skill.read(source)
     if record.is_ours(source):
@@ -106,7 +106,7 @@ def write(value: Any, path: str | Path) -> None:
         content = record.encode(values.record_of(value))
     else:
         raise InputError(f"{path}: a {type(value).__name__} is nothing that can be written")
-    streams.write(path, content)
+    file_io.write(path, content)
 
 
 def read_surface(

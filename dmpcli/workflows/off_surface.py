@@ -65,8 +65,8 @@ def remedy(
 def _hint(at: "Floats", read: "SurfaceInput", in_part: bool) -> str | None:
     import numpy as np
 
-    from dmpcli import rotations
     from dmpcli.records.mesh import UNITS
+    from dmpcli.spatial import rotations
     from dmpcli.surfaces.placement import slips
 
     position, angles = np.reshape(read.said_pose or np.zeros(6), (2, 3))

@@ -9,14 +9,14 @@ from dmpcli.messages import tell, warn
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dmpcli.primitives.drawn_strokes import OnBorder, Stroke, Style
-    from dmpcli.primitives.skill import Skill
+    from dmpcli.dmp.drawn_strokes import DrawnStroke, GeneralizeOptions, OnBorder
+    from dmpcli.dmp.skill import Skill
     from dmpcli.records.pairs import PairTable
     from dmpcli.settings.generalize import GeneralizeSettings
     from dmpcli.settings.options import Given
     from dmpcli.surfaces.border_margin import BorderMargin
     from dmpcli.surfaces.keep_off import Region
-    from dmpcli.surfaces.protocol import Surface
+    from dmpcli.surfaces.surface import Surface
 
 _REST = "bends and ends ask for less: lower --tool-speed, or raise --tool-acceleration"
 SLOW = f"hold --tool-speed on less than half of their paths; {_REST}"
@@ -123,7 +123,7 @@ def copied(table: "PairTable", settings: "GeneralizeSettings") -> "PairTable":
     """
     import numpy as np
 
-    from dmpcli.primitives import copies
+    from dmpcli.dmp import copies
     from dmpcli.records.pairs import PairTable
 
     count = settings.copies
@@ -146,13 +146,13 @@ def copied(table: "PairTable", settings: "GeneralizeSettings") -> "PairTable":
 
 
 def process_style(
-    style: "Style",
+    style: "GeneralizeOptions",
     settings: "GeneralizeSettings",
     on_border: "OnBorder",
     surface: "Surface | None",
     keep_out: Path | None,
     inputs: list[dict[str, str]],
-) -> "Style":
+) -> "GeneralizeOptions":
     """Return the style with what the process asks for.
 
     Raises
@@ -212,11 +212,11 @@ def _regions(
     settings: "GeneralizeSettings",
     inputs: list[dict[str, str]],
 ) -> "tuple[Region, ...]":
-    from dmpcli.records import lines, streams
+    from dmpcli.records import file_io, lines
     from dmpcli.surfaces.keep_out import enclosed
 
     assert surface is not None
-    source = streams.read(keep_out)
+    source = file_io.read(keep_out)
     inputs.append({"role": "keep-out", "sha256": source.sha256})
     found = []
     for name, line in lines.read(source):
@@ -235,10 +235,12 @@ def _regions(
     return tuple(found)
 
 
-def warn_of_speed(strokes: "Sequence[Stroke]", ids: "Sequence[str]", style: "Style") -> None:
+def warn_of_speed(
+    strokes: "Sequence[DrawnStroke]", ids: "Sequence[str]", style: "GeneralizeOptions"
+) -> None:
     """Warn of strokes that hold the speed that was asked for on a small part of their path only."""
-    from dmpcli.batch.job import is_slow
-    from dmpcli.primitives.tool_speed import held
+    from dmpcli.batch.part import is_slow
+    from dmpcli.dmp.tool_speed import held
 
     for name, stroke in zip(ids, strokes, strict=True):
         if style.pace is not None and is_slow(stroke, style):
@@ -250,7 +252,7 @@ def warn_of_speed(strokes: "Sequence[Stroke]", ids: "Sequence[str]", style: "Sty
             )
 
 
-def pieces(strokes: "Sequence[Stroke]", ids: "Sequence[str]", rate: float, split: bool) -> str:
+def pieces(strokes: "Sequence[DrawnStroke]", ids: "Sequence[str]", rate: float, split: bool) -> str:
     """Return in words what several strokes of one file are: copies, pieces, or both."""
     if split:
         tell(SPLIT)

@@ -4,17 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.batch.job import settle
+from dmpcli.batch.part import settle
+from dmpcli.dmp.contact_heights import end_heights
+from dmpcli.dmp.copies import ends as own_ends
+from dmpcli.dmp.feasibility import snapped
+from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import RefusedError, about, counted
 from dmpcli.messages import tell, warn
-from dmpcli.primitives.admission import snapped
-from dmpcli.primitives.contact_heights import end_heights
-from dmpcli.primitives.copies import ends as own_ends
-from dmpcli.primitives.drawing import draw, seen_from
 from dmpcli.records import trajectory
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
-from dmpcli.surfaces.protocol import LEAVES
+from dmpcli.surfaces.surface import LEAVES
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import pieces, warn_of_speed
 

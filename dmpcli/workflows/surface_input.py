@@ -10,10 +10,10 @@ import numpy as np
 from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
+    from dmpcli.records.file_io import Source
     from dmpcli.records.pose import PoseFile
-    from dmpcli.records.streams import Source
     from dmpcli.spatial.pose import Pose
-    from dmpcli.surfaces.protocol import Surface
+    from dmpcli.surfaces.surface import Surface
 
 _READ = "_read_from"
 
@@ -55,7 +55,7 @@ class SurfaceInput:
     @property
     def facts(self) -> dict[str, Any]:
         """Kind, sha256, unit and pose (X Y Z RX RY RZ, mm and rad, or None), as a skill keeps."""
-        from dmpcli import rotations
+        from dmpcli.spatial import rotations
 
         six = None
         if self.pose is not None:
@@ -103,15 +103,15 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
         A file that cannot be read or is none of them, a wrong pose or unit; by name.
     """
     from dmpcli.messages import tell
+    from dmpcli.records import file_io
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
-    from dmpcli.records import streams
     from dmpcli.records import surface as surface_file
     from dmpcli.records.mesh import MeshFile
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.workflows.pose_hints import warn_of_angles
 
-    source = streams.read(path)
+    source = file_io.read(path)
     inputs = [{"role": "surface", "sha256": source.sha256}]
     options: dict[str, Any] = {}
     placed, said = None, []

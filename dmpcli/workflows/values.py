@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.batch.job import settle
+from dmpcli.batch.part import settle
+from dmpcli.dmp.feasibility import snapped
+from dmpcli.dmp.generalization import draw
 from dmpcli.errors import InputError, about
-from dmpcli.figures.recorded import Recorded
-from dmpcli.figures.stroke import Stroke
-from dmpcli.figures.strokes import strokes_of
-from dmpcli.primitives.admission import snapped
-from dmpcli.primitives.drawing import draw
-from dmpcli.records import record, recordings, schemas, streams
+from dmpcli.records import file_io, record, recordings, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Provenance, Record
-from dmpcli.records.streams import Source
 from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
-from dmpcli.rotations import from_euler, to_euler
+from dmpcli.reporting.recorded import Recorded
+from dmpcli.reporting.stroke import ReportedStroke
+from dmpcli.reporting.strokes import strokes_of
+from dmpcli.spatial.rotations import from_euler, to_euler
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.recording import recording
@@ -121,11 +121,11 @@ def of_record(found: Record) -> DrawnTrajectory | TrajectoryBatch:
 
 def batch_in(folder: Path) -> TrajectoryBatch:
     """Read the folder of a batch whole."""
-    pairs = record.decode(streams.read_table(folder), schemas.PAIRS)
+    pairs = record.decode(file_io.read_table(folder), schemas.PAIRS)
     known: dict[str, Trajectory] = {}
     parts = [part for part in pairs.columns.get("part", ()) if part]
     for name in dict.fromkeys(map(str, parts)):
-        part = record.decode(streams.read(folder / name), schemas.TRAJECTORY)
+        part = record.decode(file_io.read(folder / name), schemas.TRAJECTORY)
         for key, rows in rows_by_id(part.columns["id"]).items():
             known[key] = stored(part, key, rows)
     ids = [str(name) for name in pairs.columns["id"]]
@@ -222,7 +222,7 @@ def record_of(one: Trajectory) -> Record:
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
 
 
-def measured(one: Trajectory) -> Stroke:
+def measured(one: Trajectory) -> ReportedStroke:
     """Return a stroke as reports measure it."""
     if isinstance(one, Demonstration):
         source = one.file()

@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
-from dmpcli.records import manifest, record, skill, streams
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.records import file_io, manifest, record, skill
 from dmpcli.records.record import Provenance
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 DMPCLI = str(Path(sys.executable).with_name("dmpcli"))
 COLUMNS = "x0,y0,z0,xg,yg,zg"
@@ -26,7 +26,7 @@ COLUMNS = "x0,y0,z0,xg,yg,zg"
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory):
     path = tmp_path_factory.mktemp("skill") / "s.json"
-    result = fit([paper_stroke(turning=True)], Choices())
+    result = fit([paper_stroke(turning=True)], FitOptions())
     one = skill.Reproduction(sha256="0", duration=10.0, rms=0, largest=0, end=0, smoothing=0)
     path.write_bytes(skill.encode(result.skill, [one], Provenance("fit")))
     return path
@@ -74,10 +74,10 @@ def test_part_n_holds_the_pairs_of_part_n_in_order_and_the_manifest_says_so(whol
         *(f"part-0000{n}.parquet" for n in range(5)),
     ]
     for number, rows in enumerate([range(50), range(50, 100), range(100, 150)]):
-        part = record.decode(streams.Source("part", files[f"part-0000{number}.parquet"]))
+        part = record.decode(file_io.Source("part", files[f"part-0000{number}.parquet"]))
         expected = [str(row + 1) for row in rows if row not in (60, 229)]
         assert list(dict.fromkeys(part.columns["id"])) == expected
-    found = manifest.decode(streams.Source("m", files["_manifest.json"]))
+    found = manifest.decode(file_io.Source("m", files["_manifest.json"]))
     assert (found.pairs, found.drawn) == (230, 228)
     assert [entry.pairs for entry in found.parts] == [50, 49, 50, 50, 29]
     assert [entry.bytes for entry in found.parts] == [
@@ -178,7 +178,7 @@ def test_a_stopped_run_keeps_finished_parts_and_no_manifest(learned, tmp_path, j
     assert not [name for name in kept if name.endswith(".tmp")]
     assert 0 < len(kept) < 60
     for data in kept.values():
-        record.decode(streams.Source("part", data))
+        record.decode(file_io.Source("part", data))
 
 
 def children(pid):
@@ -208,8 +208,8 @@ def test_single_precision_keeps_times_and_halves_the_step_of_places(learned, who
     table, files = whole
     run(learned, tmp_path / "b", table, "--on-error", "skip", "--float32", "--compression", "lz4")
     for name in ("part-00000.parquet", "part-00004.parquet"):
-        single = record.decode(streams.read(tmp_path / "b" / name))
-        double = record.decode(streams.Source(name, files[name]))
+        single = record.decode(file_io.read(tmp_path / "b" / name))
+        double = record.decode(file_io.Source(name, files[name]))
         np.testing.assert_array_equal(single.t, double.t)
         np.testing.assert_allclose(single.position(), double.position(), rtol=6e-8)
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from dmpcli.admittance.payload_identification import check_orientations, condition
 from dmpcli.calibration.orientations import around
-from dmpcli.primitives.choices import CONDITION
-from dmpcli.primitives.identification import check_orientations, condition
+from dmpcli.dmp.options import CONDITION
 
 HOME = Rotation.from_euler("xyz", [170, 5, -30], degrees=True).as_matrix()
 

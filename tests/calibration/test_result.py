@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 from dmpcli.calibration import result
 from dmpcli.calibration.orientations import around
 from dmpcli.errors import RefusedError
-from dmpcli.primitives import wrench
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.simulation.mock import PEN, PEN_DOWN
+from dmpcli.spatial import wrench
 
 GEOMETRY = replace(PEN, weight=0.0, centre=np.zeros(3), zero=None)
 

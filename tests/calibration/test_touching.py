@@ -6,8 +6,8 @@ from dmpcli.calibration.resting import Watcher
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError
 from dmpcli.records import pairs, touched
+from dmpcli.records.file_io import read
 from dmpcli.records.points import PairFile, PointFile
-from dmpcli.records.streams import read
 from tests.calibration.calibration_fakes import Arm, SimulatedClock
 
 

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dmpcli.admittance.compensation import Compensation
 from dmpcli.calibration import result
 from dmpcli.calibration.orientations import around
 from dmpcli.calibration.tour import Interrupted, Tour
@@ -13,8 +14,7 @@ from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
-from dmpcli.primitives.compensation import Compensation
-from dmpcli.primitives.reach import Reach
+from dmpcli.kinematics.reachability import Reach
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Scene
 from dmpcli.simulation.mock.parameters import Faults, ServoParameters

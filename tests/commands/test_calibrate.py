@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from dmpcli import cli
 from dmpcli.records import record, schemas, static_poses
 from dmpcli.records import tool as tool_file
-from dmpcli.records.streams import Source, read
+from dmpcli.records.file_io import Source, read
 from dmpcli.simulation.mock import PEN
 from tests.commands.terminal import DMPCLI, Terminal
 

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.measures.deviation import nearest_distance
-from dmpcli.measures.wave import stroke_wave
-from dmpcli.records import record, streams
+from dmpcli.metrics.deviation import nearest_distance
+from dmpcli.metrics.wave_height import stroke_wave
+from dmpcli.records import file_io, record
 from tests import cases
 from tests.records import meshes
 from tests.surfaces import fields
@@ -51,7 +51,7 @@ class Lab:
         """Trajectory record and what was said."""
         done = self.run("generalize", skill, "-o", self.folder / "drawn", *options)
         assert done.exit_code == 0, done.stderr
-        return record.decode(streams.read(self.folder / "drawn")), done.stderr
+        return record.decode(file_io.read(self.folder / "drawn")), done.stderr
 
     def refusal(self, skill, *options):
         """What is said where it is refused."""

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.commands.execute import Request, _check_output
+from dmpcli.commands.execute import ExecutionRequest, _check_output
 from dmpcli.errors import InputError
-from dmpcli.records import record, schemas, streams, tool
+from dmpcli.records import file_io, record, schemas, tool
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.mock import PEN
 
@@ -60,7 +60,7 @@ def execute(*arguments, expect=0):
 
 
 def run_of(path):
-    return record.decode(streams.read(path), schemas.RUN)
+    return record.decode(file_io.read(path), schemas.RUN)
 
 
 def refused(*arguments, code, output=None):
@@ -80,7 +80,7 @@ def test_a_run_holds_what_was_planned_sent_and_done(traj, tmp_path):
     execute(traj, "-o", out)
     run = run_of(out)
     stroke = run.columns["phase"] == "stroke"
-    planned = record.decode(streams.read(traj)).position()
+    planned = record.decode(file_io.read(traj)).position()
     np.testing.assert_array_equal(run.position("plan")[stroke], planned)
     np.testing.assert_array_equal(run.position("sent")[stroke], planned)
     assert np.linalg.norm(run.position()[-1] - planned[-1]) < 0.05
@@ -94,7 +94,7 @@ def test_a_run_holds_what_was_planned_sent_and_done(traj, tmp_path):
     assert (facts["completed"], facts["missed"], facts["simulated"]) == (True, 0, True)
     assert facts["trajectory"]["tau"] == 5.0
     assert "lateness" not in facts
-    assert run.provenance.inputs == ({"role": "trajectory", "sha256": streams.read(traj).sha256},)
+    assert run.provenance.inputs == ({"role": "trajectory", "sha256": file_io.read(traj).sha256},)
 
 
 @pytest.mark.slow
@@ -474,7 +474,7 @@ def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_pa
 def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
     out = tmp_path / "run.parquet"
     out.write_bytes(b"older")
-    request = Request(str(traj), (), str(out), "mock:", None, None, None, *[False] * 4)
+    request = ExecutionRequest(str(traj), (), str(out), "mock:", None, None, None, *[False] * 4)
     with pytest.raises(InputError, match="--force replaces it"):
         _check_output(request, repeatable=False)
     _check_output(dataclasses.replace(request, force=True), repeatable=False)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.records import record, schemas, streams
+from dmpcli.records import file_io, record, schemas
 from dmpcli.records.record import Provenance, Record
 
 PERIOD = 0.02
@@ -96,7 +96,7 @@ def execute(*arguments, expect=0):
 
 
 def run_of(path):
-    return record.decode(streams.read(path), schemas.RUN)
+    return record.decode(file_io.read(path), schemas.RUN)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 
 def run(*args):

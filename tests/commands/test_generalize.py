@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
-from dmpcli.records import record, schemas, skill, streams
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.records import file_io, record, schemas, skill
 from dmpcli.records.record import Provenance
-from tests.primitives.strokes import GOAL, START, circle, paper_stroke
+from tests.dmp.strokes import GOAL, START, circle, paper_stroke
 
 PAIR = ["--start", -701.698, 132.420, -17.538, "--goal", -807.597, 129.739, -17.518]
 
@@ -24,7 +24,7 @@ def run(*args):
 
 
 def write_skill(path, stroke, **choices):
-    result = fit([stroke], Choices(**choices))
+    result = fit([stroke], FitOptions(**choices))
     one = skill.Reproduction(sha256="0", duration=10.0, rms=0, largest=0, end=0, smoothing=0)
     path.write_bytes(skill.encode(result.skill, [one], Provenance("fit")))
     return path
@@ -36,7 +36,7 @@ def learned(tmp_path_factory):
 
 
 def read(path):
-    return record.decode(streams.read(path))
+    return record.decode(file_io.read(path))
 
 
 def test_one_pair_is_one_file_with_what_execute_needs(learned, tmp_path):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from dmpcli import cli, rotations
+from dmpcli import cli
+from dmpcli.spatial import rotations
 from tests.commands.test_generalize import read, run, write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 ROOT = Path(__file__).parents[2]
 RADIUS = 60.0

@@ -7,12 +7,13 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
-from dmpcli import cli, rotations
-from dmpcli.primitives import references
-from dmpcli.primitives.smoothing import Stroke
-from dmpcli.records import record, streams
+from dmpcli import cli
+from dmpcli.dmp import reference_paths
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.records import file_io, record
+from dmpcli.spatial import rotations
 from tests.commands.test_generalize import run, write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 PAIR = ["--start", -80, 5, 0, "--goal", 80, 5, 0]
 FREE = ["--start", -80, -35, 0, "--goal", 80, -35, 0]
@@ -41,9 +42,9 @@ def shop(tmp_path_factory):
     folder = tmp_path_factory.mktemp("shop")
     t = np.linspace(0, 8, 401)
     angles = np.tile([np.pi, 0.0, 0.0], (401, 1))
-    x = references.sine(np.zeros(3), np.array([120.0, 0, 0]), 30.0, t, 8.0)
-    write_skill(folder / "s.json", Stroke(t, x, rotations.from_euler(angles)))
-    write_skill(folder / "bare.json", Stroke(t, x))
+    x = reference_paths.sine(np.zeros(3), np.array([120.0, 0, 0]), 30.0, t, 8.0)
+    write_skill(folder / "s.json", SmoothedStroke(t, x, rotations.from_euler(angles)))
+    write_skill(folder / "bare.json", SmoothedStroke(t, x))
     write_skill(folder / "original.json", paper_stroke(), model="original")
     holed_plate().export(folder / "plate.ply")
     trimesh.creation.box((300, 300, 10)).apply_translation([0, 0, -5]).export(folder / "box.stl")
@@ -61,7 +62,7 @@ def shop(tmp_path_factory):
 
 
 def strokes(path):
-    found = record.decode(streams.read(path))
+    found = record.decode(file_io.read(path))
     ids = found.columns["id"]
     order = list(dict.fromkeys(ids))
     return {str(n): (found.t[ids == n], found.position()[ids == n]) for n in order}, found
@@ -224,7 +225,7 @@ def test_lead_and_tilt_are_those_against_the_normals_of_the_file(shop, tmp_path,
         "--surface", shop / surface, "--lead", 20, "--tilt", 0, "--rate", 200,
     )  # fmt: skip
     assert done.exit_code == 0, done.stderr
-    found = record.decode(streams.read(out))
+    found = record.decode(file_io.read(out))
     x, axis = found.position(), -found.rotation()[:, :, 2]
     normal = np.tile(np.eye(3)[2], (len(x), 1))
     if surface == "cylinder.json":
@@ -275,7 +276,7 @@ def test_a_batch_does_all_of_it_at_once_with_the_same_bytes_for_any_number_of_jo
     assert names == sorted(p.name for p in (tmp_path / "b2").iterdir())
     for name in names:
         assert (tmp_path / "b1" / name).read_bytes() == (tmp_path / "b2" / name).read_bytes()
-    table = record.decode(streams.read_table(tmp_path / "b1"))
+    table = record.decode(file_io.read_table(tmp_path / "b1"))
     ids = [str(name) for name in table.columns["id"]]
     assert {"a_0.1", "a_0.2", "b_0.1", "b_0.2", "c_0"} <= set(ids)
     for row, name in enumerate(ids):

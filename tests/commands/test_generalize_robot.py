@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from dmpcli.kinematics import chain, models
-from dmpcli.primitives.reach import Reach
-from dmpcli.records import streams
+from dmpcli.kinematics.reachability import Reach
+from dmpcli.records import file_io
 from tests.commands.test_generalize import PAIR, read, run, write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 MODEL = ["--robot-model", "ec66"]
 FAR = ["--start", -901.698, 132.420, -17.538, "--goal", -1007.597, 129.739, -17.518]
@@ -115,7 +115,7 @@ def test_where_every_pair_is_out_of_reach_the_folder_says_why_of_each(learned, t
     assert "no pair can be drawn" in done.stderr.splitlines()[-1]
     status = read(tmp_path / "c" / "pairs.parquet").columns["status"]
     assert all("out of reach" in str(each) for each in status)
-    assert json.loads((tmp_path / "c" / streams.MANIFEST).read_text())["drawn"] == 0
+    assert json.loads((tmp_path / "c" / file_io.MANIFEST).read_text())["drawn"] == 0
 
 
 def test_the_geometry_of_a_tool_is_enough_where_nothing_is_felt(learned, tmp_path):

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.records import record, streams
+from dmpcli.records import file_io, record
 from tests.commands.test_generalize import write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 
 def run(*arguments):
@@ -41,7 +41,7 @@ def test_the_surface_decides_the_side_and_the_wave_is_not_mirrored(skill, tmp_pa
         "generalize", skill, "-o", out, *ends, "--surface", plane, "--contact", 5, "--offset", 2
     )
     assert done.exit_code == 0, done.stderr
-    drawn = record.decode(streams.read(out))
+    drawn = record.decode(file_io.read(out))
     _, height, z = drawn.position().T
     assert z[np.argmax(np.abs(z[: len(z) // 2]))] > 39.0
     np.testing.assert_allclose(height, 2.0 * y, atol=1e-9)
@@ -70,5 +70,5 @@ def test_where_the_taught_side_is_not_decided_or_not_the_surfaces_own_it_is_told
     assert ("normals point away from" in done.stderr) == (word == "away from")
     assert ("--start X Y Z RX RY RZ" in done.stderr) == (word is not None)
     if word != "warning":
-        drawn = record.decode(streams.read(out))
+        drawn = record.decode(file_io.read(out))
         assert drawn.columns["nz"][0] > 0.9  # to where the tool came from

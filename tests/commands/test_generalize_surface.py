@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from dmpcli import cli, rotations
-from dmpcli.records import record, streams
+from dmpcli import cli
+from dmpcli.records import file_io, record
+from dmpcli.spatial import rotations
 from tests.commands.test_generalize import run, write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 
 ROOT = Path(__file__).parents[2]
 BENCH = ROOT / "sample_runs" / "bench.stl"
@@ -26,7 +27,7 @@ def learned(tmp_path_factory):
 
 
 def read(path):
-    return record.decode(streams.read(path))
+    return record.decode(file_io.read(path))
 
 
 def off_the_bench(position):

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from tests.figures.example_files import demonstration, paper_files, put, trajectory, wave
 from tests.records.meshes import box, grid, obj, written
+from tests.reporting.example_files import demonstration, paper_files, put, trajectory, wave
 
 
 def dmpcli(*words, stdin=None):

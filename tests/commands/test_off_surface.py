@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.records import record, streams
+from dmpcli.records import file_io, record
 from tests.commands.test_generalize import write_skill
-from tests.primitives.strokes import paper_stroke
+from tests.dmp.strokes import paper_stroke
 from tests.records.meshes import box, obj
 
 V, F = box((200.0, 120.0, 40.0))
@@ -45,7 +45,7 @@ def drawn(*args):
 
 
 def position(folder, name="t.parquet"):
-    return record.decode(streams.read(folder / name)).position()
+    return record.decode(file_io.read(folder / name)).position()
 
 
 def test_an_end_off_the_part_is_named_with_the_nearest_point_ready_to_paste(lab):
@@ -136,7 +136,7 @@ def test_pairs_in_the_parts_axes_are_drawn_and_kept_in_the_base(lab):
     words = ["--pairs", "pairs.csv", "--on-error", "skip", "--in", "part"]
     done = run("generalize", "skill.json", "-o", "b", *words, "--surface", "part.obj", *POSE)
     assert done.exit_code == 0, done.stderr
-    table = record.decode(streams.read(lab / "b" / "pairs.parquet")).columns
+    table = record.decode(file_io.read(lab / "b" / "pairs.parquet")).columns
     np.testing.assert_allclose([table[n][0] for n in ("x0", "y0", "z0")], IN_BASE[0], atol=1e-9)
     said = table["status"][1]
     assert "start lies 9.000 and goal 9.000 mm off the surface" in said

@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.records import record, schemas, streams, tool
-from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.records import file_io, record, schemas, tool
+from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.service import ControllerService
 from dmpcli.simulation.mock import PEN
 from tests.commands.test_execute import START, columns, written
@@ -146,7 +146,7 @@ def test_an_instrument_beside_a_mock_one_must_be_meant(tmp_path):
 @pytest.mark.parametrize("mode", ["stream", "file"])
 def test_a_stroke_is_drawn_by_the_virtual_arm_and_logged(mode, traj, pen, tmp_path):
     out = tmp_path / "run.parquet"
-    service = ControllerService(VirtualLab(Setting(START)))
+    service = ControllerService(VirtualLab(LabParameters(START)))
     try:
         url = (
             f"elite://127.0.0.1:{service.robot_port}?monitor_port={service.monitor_port}"
@@ -156,7 +156,7 @@ def test_a_stroke_is_drawn_by_the_virtual_arm_and_logged(mode, traj, pen, tmp_pa
         dmpcli("execute", traj, "-o", out, *options, expect=0)
     finally:
         service.close()
-    run = record.decode(streams.read(out), schemas.RUN)
+    run = record.decode(file_io.read(out), schemas.RUN)
     facts = run.provenance.facts
     assert (facts["reason"], facts["completed"], facts["simulated"]) == ("done", True, False)
     assert run.provenance.options["robot"] == "elite"

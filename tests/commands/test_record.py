@@ -14,12 +14,12 @@ from dmpcli.commands import record
 from dmpcli.control import keyboard, workcell
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments import clock
-from dmpcli.records import journal, streams, tool
+from dmpcli.records import file_io, journal, tool
+from dmpcli.records.file_io import Source, read
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, decode
-from dmpcli.records.rows import Rows
+from dmpcli.records.row_buffer import RowBuffer
 from dmpcli.records.schemas import DEMONSTRATION
-from dmpcli.records.streams import Source, read
 from dmpcli.simulation.mock import PEN, MockServo
 from tests.control.drag_fakes import drag_settings
 
@@ -284,7 +284,7 @@ def test_a_recording_that_goes_on_is_not_disturbed_by_another_of_its_name(
     pen, out = tmp_path / "pen.json", tmp_path / "demo.parquet"
     pen.write_bytes(tool.encode(PEN))
     going = Journal(
-        journal.beside(str(out)), Rows({"t": 1}), DEMONSTRATION, Provenance("record", {})
+        journal.beside(str(out)), RowBuffer({"t": 1}), DEMONSTRATION, Provenance("record", {})
     )
     if stale:
         going._end_thread()
@@ -336,14 +336,14 @@ def test_a_second_signal_while_the_file_is_written_does_not_lose_it(tmp_path, mo
             if 2.999 < t < 3.001:
                 signal.raise_signal(signal.SIGINT)
 
-    write = streams.write
+    write = file_io.write
 
     def interrupted(output, content):
         signal.raise_signal(signal.SIGINT)
         write(output, content)
 
     monkeypatch.setattr(clock, "SimulatedClock", Signalling)
-    monkeypatch.setattr(streams, "write", interrupted)
+    monkeypatch.setattr(file_io, "write", interrupted)
     out = tmp_path / "demo.parquet"
     assert run("-o", out).exit_code == 130
     assert demonstration(out).t[-1] == pytest.approx(1.5, abs=0.05)

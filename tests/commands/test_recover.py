@@ -8,11 +8,11 @@ from dmpcli.cli import app
 from dmpcli.control import demonstration_log
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.messages import on_terminal
-from dmpcli.records import journal, record, schemas, streams
+from dmpcli.records import file_io, journal, record, schemas
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance, Record
-from dmpcli.records.rows import Rows
-from dmpcli.workflows.keeping import Keeper
+from dmpcli.records.row_buffer import RowBuffer
+from dmpcli.workflows.run_output import RunOutput
 from tests.control.drag_fakes import rehearse
 
 KNOWN = Provenance("record", {"seed": 1}, (), {"simulated": True})
@@ -39,7 +39,7 @@ def drawn():
 
 def crashed(path, whole, count):
     """The journal of a recording that broke off after so many rows."""
-    rows = Rows(whole.groups)
+    rows = RowBuffer(whole.groups)
     kept = Journal(path, rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(whole.whole(0, count), {})
     kept._end_thread()
@@ -52,7 +52,7 @@ def test_the_rows_that_were_kept_are_those_of_the_whole_run_to_the_last_bit(draw
     path, out = crashed(tmp_path / "a.parquet.journal", drawn.rows, 100), tmp_path / "a.parquet"
     told = recover(path, "-o", out).stderr
     assert "100 rows, 1.98 s, as far as the journal goes" in told
-    back, whole = record.decode(streams.read(out)), drawn.columns()
+    back, whole = record.decode(file_io.read(out)), drawn.columns()
     assert set(back.columns) == set(whole)
     for name, column in back.columns.items():
         assert column.tobytes() == whole[name][:100].tobytes(), name
@@ -81,8 +81,8 @@ def test_a_broken_end_is_left_out_and_said(drawn, tmp_path):
 def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_path, monkeypatch):
     """The output's folder is full when the run ends; afterwards there is room."""
     out = tmp_path / "a.parquet"
-    keeper = Keeper(str(out), realtime=True)
-    rows = Rows(drawn.rows.groups)
+    keeper = RunOutput(str(out), realtime=True)
+    rows = RowBuffer(drawn.rows.groups)
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 70), {})
     facts = KNOWN.facts | {"ended": "duration", "missed": 1}
@@ -94,7 +94,7 @@ def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_p
         raise InputError(f"{path}: cannot be written: No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(streams, "write", full)
+        patch.setattr(file_io, "write", full)
         with pytest.raises(InputError, match=r"(?s)No space left.*dmpcli recover"):
             keeper.keep(whole, None)
     os.close(keeper._journal._file)
@@ -106,8 +106,8 @@ def test_from_the_journal_of_a_run_that_ended_the_very_file_is_made(drawn, tmp_p
 
 def test_another_failure_is_told_after_the_one_of_the_file(drawn, tmp_path, monkeypatch, capsys):
     on_terminal(quiet=False)
-    keeper = Keeper(str(tmp_path / "a"), realtime=True)
-    rows = Rows(drawn.rows.groups)
+    keeper = RunOutput(str(tmp_path / "a"), realtime=True)
+    rows = RowBuffer(drawn.rows.groups)
     keeper.begin(rows, schemas.DEMONSTRATION, KNOWN)
     rows.extend(drawn.rows.whole(0, 5), {})
     (tmp_path / "a").mkdir()
@@ -119,10 +119,10 @@ def test_another_failure_is_told_after_the_one_of_the_file(drawn, tmp_path, monk
 
 def test_simulated_time_has_no_journal_and_a_pipe_says_so(drawn, tmp_path, capsys):
     on_terminal(quiet=False)
-    keeper = Keeper(str(tmp_path / "a"), realtime=False)
+    keeper = RunOutput(str(tmp_path / "a"), realtime=False)
     keeper.begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
     assert list(tmp_path.iterdir()) == []
-    Keeper("-", realtime=True).begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
+    RunOutput("-", realtime=True).begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
     assert "no journal" in capsys.readouterr().err
     assert keeper.hindrance() is None
 
@@ -144,7 +144,7 @@ def test_what_is_there_is_replaced_only_when_asked(drawn, tmp_path):
     assert "--force" in refused(path, "-o", out)
     assert out.read_bytes() == b"older"
     recover(path, "-o", out, "--force")
-    assert len(record.decode(streams.read(out))) == 20
+    assert len(record.decode(file_io.read(out))) == 20
 
 
 @pytest.mark.parametrize("command", ["inspect", "fit", "report", "execute"])
@@ -162,5 +162,5 @@ def test_other_commands_say_that_it_is_a_journal_and_what_to_do(drawn, tmp_path,
 def test_the_clock_stays_in_the_journal(drawn, tmp_path):
     path, out = crashed(tmp_path / "a.journal", drawn.rows, 20), tmp_path / "a.parquet"
     recover(path, "-o", out)
-    assert len(journal.read(streams.read(path, journal=True)).rows.numbers("clock")) == 20
-    assert "clock" not in record.decode(streams.read(out)).columns
+    assert len(journal.read(file_io.read(path, journal=True)).rows.numbers("clock")) == 20
+    assert "clock" not in record.decode(file_io.read(out)).columns

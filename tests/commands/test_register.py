@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 from dmpcli import cli
 from dmpcli.commands import register_checks
 from dmpcli.errors import RefusedError
-from dmpcli.records import pose, streams, touched
+from dmpcli.records import file_io, pose, touched
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.registration import Part, onto_surface
+from dmpcli.surfaces.registration import RegisteredPart, onto_surface
 from tests.records.meshes import box, obj, written
 from tests.surfaces.registration_trial import touched_on, wedge
 
@@ -52,7 +52,7 @@ def lab(tmp_path, monkeypatch):
 
 
 def found(folder, name="pose.json"):
-    return pose.decode(streams.read(folder / name))
+    return pose.decode(file_io.read(folder / name))
 
 
 def assert_near(folder, atol):
@@ -70,7 +70,7 @@ def test_point_pairs_give_the_pose(lab):
     assert file.residuals.largest < 1e-9
     assert file.conditioning.number < 3.0
     assert [entry["role"] for entry in file.inputs] == ["part", "touched"]
-    assert file.inputs[0]["sha256"] == streams.read(lab / "part.stl").sha256
+    assert file.inputs[0]["sha256"] == file_io.read(lab / "part.stl").sha256
     assert "condition number" in done.stderr
     assert "chordal error estimated at" in done.stderr
     assert "least certain" in done.stderr
@@ -220,8 +220,8 @@ def test_a_bad_start_is_told_as_a_bad_start_and_the_pose_found_all_the_same(wedg
 
 @pytest.mark.slow
 def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(wedge_lab):
-    points = touched.read(streams.read(wedge_lab / "on.csv"))
-    part = Part.of(Mesh(*wedge()))
+    points = touched.read(file_io.read(wedge_lab / "on.csv"))
+    part = RegisteredPart.of(Mesh(*wedge()))
     start = Pose.of(np.array([446.0, -61.0, 18.0, 2.6, 1.3, -2.5]))
     alone = Pose(start.position[None], start.rotation[None])
     stuck = onto_surface(points.base, part, alone)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from dmpcli.cli import app
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
-from tests.figures.example_files import (
+from tests.reporting.example_files import (
     CURVED_GOAL,
     CURVED_START,
     GOAL,

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.records import record, schemas, streams
-from tests.figures.batches import put_batch
-from tests.figures.example_files import GOAL, START, demonstration, put, wave
+from dmpcli.records import file_io, record, schemas
+from tests.reporting.batches import put_batch
+from tests.reporting.example_files import GOAL, START, demonstration, put, wave
 
 T = 0.02 * np.arange(501)
 FAILED = [
@@ -181,7 +181,7 @@ def test_a_part_of_another_batch_is_named(tmp_path, demo, folder):
     # Even where nobody counted the bytes its pairs are not the table's.
     (folder / "_manifest.json").unlink()
     assert "holds pair '1' where pairs.parquet says '19'" in refused(demo, folder)
-    found = record.decode(streams.read(part), schemas.TRAJECTORY)
+    found = record.decode(file_io.read(part), schemas.TRAJECTORY)
     found.provenance.options["rate"] = 99.0
     part.write_bytes(record.encode(found))
     assert "other inputs or options" in refused(demo, folder)
@@ -209,7 +209,7 @@ def test_a_part_that_lacks_a_pair_or_runs_backwards_is_named(tmp_path, demo):
     folder = put_batch(tmp_path / "short", [waves(HEIGHTS)])
     (folder / "_manifest.json").unlink()
     part = folder / "part-00000.parquet"
-    found = record.decode(streams.read(part), schemas.TRAJECTORY)
+    found = record.decode(file_io.read(part), schemas.TRAJECTORY)
     few = {name: column[: 29 * 501] for name, column in found.columns.items()}
     part.write_bytes(record.encode(record.Record(found.schema, few, found.provenance)))
     assert "lacks pair '30'" in refused(demo, folder)

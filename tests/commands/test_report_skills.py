@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from tests.figures.example_files import wave
+from tests.reporting.example_files import wave
 
 
 def run(*words, expect=0):

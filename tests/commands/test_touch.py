@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from dmpcli import cli
 from dmpcli.records import pairs, tables, touched
-from dmpcli.records.streams import Source, read
+from dmpcli.records.file_io import Source, read
 from tests.commands.terminal import Terminal
 
 

@@ -6,8 +6,8 @@ from dmpcli.control.run_log import Row
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Stroke, make
-from dmpcli.rotations import from_euler
+from dmpcli.planning.plan import Plan, PlannedStroke, make
+from dmpcli.spatial.rotations import from_euler
 
 PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
 START = np.array([-551.030, 131.399, -17.560])
@@ -33,7 +33,7 @@ def stroke(duration=10.0, rate=50.0, turn=0.0, rotated=True, normal=None, first_
     angles = np.zeros((n + 1, 3))
     angles[:, 0] = np.pi
     angles[:, 2] = turn * minimum_jerk(t / duration)
-    return Stroke(
+    return PlannedStroke(
         "0",
         t,
         sine(t, duration),

@@ -12,7 +12,7 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Stroke, make
+from dmpcli.planning.plan import PlannedStroke, make
 from tests.control.drag_fakes import FakeSensor, FakeServo, drag_settings
 from tests.control.test_drag_loop import WEIGHTLESS
 
@@ -57,7 +57,7 @@ def executed(stall, asleep):
     t = np.arange(0.0, 3.01, PERIOD)
     u = t / t[-1]
     x = 50.0 * (10 * u**3 - 15 * u**4 + 6 * u**5)
-    still = Stroke("0", t, np.column_stack([x, 0 * x, 0 * x]), None)
+    still = PlannedStroke("0", t, np.column_stack([x, 0 * x, 0 * x]), None)
     limits = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
     plan = make(still, PERIOD, 1.0, limits, (servo.position, servo.rotation), 20.0)
     arm = ReadyArm(servo, servo.open(), clock)

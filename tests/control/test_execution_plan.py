@@ -7,7 +7,7 @@ from dmpcli.control import execution_plan
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
-from dmpcli.planning.plan import Stroke
+from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.preflight import Check
 from dmpcli.settings.execute import ExecuteSettings
 from tests.control.streaming_fakes import plan, stroke
@@ -16,7 +16,8 @@ from tests.control.streaming_fakes import plan, stroke
 def batch(*names, folder=True):
     t, position = np.arange(3.0), np.zeros((3, 3))
     found = [
-        FoundStroke(Stroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]}) for name in names
+        FoundStroke(PlannedStroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]})
+        for name in names
     ]
     return StrokeSelection(tuple(found), {}, (), folder)
 

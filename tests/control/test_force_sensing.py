@@ -7,8 +7,8 @@ from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import Sample, SensorInfo
-from dmpcli.primitives import wrench
 from dmpcli.simulation.mock import PEN, PEN_DOWN
+from dmpcli.spatial import wrench
 
 INFO = SensorInfo("fake", 100.0, np.array([100.0, 100.0, 100.0, 10.0, 10.0, 10.0]))
 UNKNOWN = replace(PEN, weight=0.0, zero=None)

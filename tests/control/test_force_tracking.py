@@ -3,14 +3,14 @@ from collections import deque
 import numpy as np
 import pytest
 
+from dmpcli.admittance import model
+from dmpcli.admittance.force_coupling import CouplingLaw, fast_filter
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import SETTLED_TIME, ForceInput, ForceTracker
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
-from dmpcli.primitives import admittance
-from dmpcli.primitives.coupling import Law, fast_filter
-from dmpcli.rotations import from_euler
 from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.spatial.rotations import from_euler
 from tests.control.streaming_fakes import START, plan, stroke
 
 PERIOD = 0.02
@@ -67,8 +67,8 @@ def test_the_wrench_is_compensated_for_the_pose_of_the_moment():
 
 
 def law(clamp=5.0):
-    one = admittance.Law(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
-    return Law(one, 5.0, clamp, 0.5, 0.1, 10.0)
+    one = model.AdmittanceLaw(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
+    return CouplingLaw(one, 5.0, clamp, 0.5, 0.1, 10.0)
 
 
 def pressing(normal=UP, clamp=5.0):

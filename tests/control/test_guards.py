@@ -7,7 +7,7 @@ from dmpcli.control import guards
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 
 BOX = (-1.0, 1.0, -2.0, 2.0, -3.0, 3.0)
 INFO = ServoInfo("fake", (0.002, 0.1), 0.2)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dmpcli.control.plan_cursor import PlanCursor
-from dmpcli.planning.plan import Stroke
+from dmpcli.planning.plan import PlannedStroke
 from tests.control.streaming_fakes import START, WIDE, plan, stroke
 
 
@@ -57,7 +57,7 @@ def test_braking_a_fast_stroke_uses_most_of_the_acceleration():
     """It shall stop smoothly, not lazily: at 250 mm/s within half a second."""
     t = np.arange(301) * 0.02
     ramp = np.minimum(t, 0.3) ** 2 / 0.6 + np.maximum(t - 0.3, 0.0)
-    made = plan(Stroke("0", t, START + 240.0 * ramp[:, None] * np.array([1.0, 0, 0])))
+    made = plan(PlannedStroke("0", t, START + 240.0 * ramp[:, None] * np.array([1.0, 0, 0])))
     cursor = PlanCursor(made, WIDE)
     indices, _ = run(cursor, brake_at=150)
     assert (len(indices) - 151) * 0.02 < 0.5

@@ -2,9 +2,9 @@ import numpy as np
 
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.records import record, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
-from dmpcli.records.streams import Source
-from dmpcli.rotations import from_euler
+from dmpcli.spatial.rotations import from_euler
 from tests.control.streaming_fakes import PEN_DOWN, START
 
 

@@ -4,6 +4,8 @@ import signal
 import numpy as np
 import pytest
 
+from dmpcli.admittance import model as admittance
+from dmpcli.admittance.force_coupling import CouplingLaw, fast_filter
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
@@ -11,9 +13,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Sample, SensorInfo
-from dmpcli.primitives import admittance
-from dmpcli.primitives.coupling import Law, fast_filter
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 from tests.control.streaming_fakes import (
     PEN_DOWN,
     START,
@@ -57,8 +57,8 @@ class Bench:
         """Feel in base axes, and seek the surface at 5 N / 2 N·s/mm = 2.5 mm/s."""
         info = SensorInfo("fake", 100.0, np.full(6, 100.0))
         sensing = Sensing(self.sensor, info, 100.0, PERIOD, self.clock)
-        model = admittance.Law(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
-        law = Law(model, 5.0, 5.0, 0.5, 0.1, 10.0)
+        model = admittance.AdmittanceLaw(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
+        law = CouplingLaw(model, 5.0, 5.0, 0.5, 0.1, 10.0)
         pressing = ForceTracker(law, fast_filter(5.0, PERIOD), self.plan)
         return ForceInput(sensing, lambda sensed, _: sensed, pressing)
 

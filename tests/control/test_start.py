@@ -10,7 +10,7 @@ from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InstrumentError, RefusedError
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, plan, stroke
 
 WATCH = StopLimits(5.0, 0.1, 50.0, 5.0)

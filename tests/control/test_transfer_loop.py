@@ -9,7 +9,7 @@ from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.planning import transfers
-from dmpcli.planning.plan import Stroke
+from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
 from tests.control.streaming_fakes import PEN_DOWN, WIDE, FakeClock, FakeServo, minimum_jerk
 
@@ -22,7 +22,7 @@ def line(name, start, goal, turn=0.0):
     u = minimum_jerk(t / 2.0)[:, None]
     start, goal = np.array(start, float), np.array(goal, float)
     up = np.tile([0.0, 0.0, 1.0], (101, 1))
-    return Stroke(name, t, start + u * (goal - start), np.tile(PEN_DOWN, (101, 1, 1)), up)
+    return PlannedStroke(name, t, start + u * (goal - start), np.tile(PEN_DOWN, (101, 1, 1)), up)
 
 
 STROKES = [

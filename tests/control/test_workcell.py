@@ -11,8 +11,8 @@ from dmpcli.control import workcell
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments import registry, servo_adapter
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.rotations import from_euler
 from dmpcli.simulation.mock import MockSensor, Plate, Scene
+from dmpcli.spatial.rotations import from_euler
 
 
 def lab(robot="mock:", sensor="mock:", scene=None):

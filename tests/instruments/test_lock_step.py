@@ -14,7 +14,7 @@ from dmpcli.cli import app
 from dmpcli.control import workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.records import record, schemas, streams
+from dmpcli.records import file_io, record, schemas
 from dmpcli.records.record import Provenance, Record
 from tests.instruments.test_drivers_page import example
 
@@ -90,7 +90,7 @@ def test_a_contact_bench_needs_no_real_time_and_gives_the_same_bytes_again(
         run("execute", stroke, "-o", out, *instruments, "--coupling", "force")
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
-    kept = record.decode(streams.read(str(out)), schemas.RUN)
+    kept = record.decode(file_io.read(str(out)), schemas.RUN)
     facts = kept.provenance.facts
     assert (facts["completed"], facts["simulated"]) == (True, True)
     assert "lateness" not in facts
@@ -119,7 +119,7 @@ def test_a_recording_of_it_needs_its_duration_and_has_no_hand_of_ours(spring, to
     assert "--duration: say how long" in run(*arguments, expect=2)
     assert "--seed: is of the mock's hand" in run(*arguments, "--seed", 1, expect=2)
     run(*arguments, "--duration", 2.0)
-    kept = record.decode(streams.read(str(out)), schemas.DEMONSTRATION)
+    kept = record.decode(file_io.read(str(out)), schemas.DEMONSTRATION)
     assert kept.t[-1] == pytest.approx(2.0)
     assert kept.provenance.facts["simulated"]
     assert "reference" not in kept.provenance.facts

@@ -17,7 +17,7 @@ from dmpcli.instruments import registry, ur
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
 from dmpcli.instruments.servo_adapter import PoseServo
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 from tests.extras_here import needs
 from tests.instruments import rtde_server
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dmpcli.kinematics import chain, models
-from dmpcli.rotations import log
+from dmpcli.spatial.rotations import log
 from tests.kinematics import urdf
 
 EC66 = models.model("ec66")

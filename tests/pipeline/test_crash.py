@@ -8,7 +8,7 @@ import time
 import pytest
 
 from benchmarks import soak
-from dmpcli.records import record, streams
+from dmpcli.records import file_io, record
 from tests.pipeline.conftest import DMPCLI
 
 pytestmark = pytest.mark.slow
@@ -18,7 +18,7 @@ PATIENT = ("--robot", "mock:?lag=0.2", "--following-error", "50")
 
 
 def read(path):
-    return record.decode(streams.read(path))
+    return record.decode(file_io.read(path))
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmpcli.records import record, schemas, streams
+from dmpcli.records import file_io, record, schemas
 from dmpcli.records import tool as tool_file
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.mock import PEN
@@ -106,7 +106,7 @@ def pipeline(folder: Path) -> Path:
 
 
 def read(path: Path, schema: schemas.Schema) -> Record:
-    return record.decode(streams.read(path), schema)
+    return record.decode(file_io.read(path), schema)
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def gaps(points: np.ndarray, path: np.ndarray) -> np.ndarray:
 
 
 def test_calibration_finds_the_tool_that_hangs_in_the_lab(folder):
-    found = tool_file.decode(streams.read(folder / "tool.json"))
+    found = tool_file.decode(file_io.read(folder / "tool.json"))
     assert found.weight == pytest.approx(PEN.weight, abs=0.05)
     np.testing.assert_allclose(found.centre, PEN.centre, atol=1.0)
     np.testing.assert_allclose(found.inclination, 0.0, atol=np.radians(0.5))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmpcli.records import record, schemas, streams
+from dmpcli.records import file_io, record, schemas
 from tests.pipeline.conftest import DMPCLI
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ def test_record_to_report(dmpcli, tmp_path):
     for stem in ("fig7", "fig8"):
         for suffix in ("svg", "png"):
             assert list((tmp_path / "out").glob(f"{stem}*.{suffix}"))
-    run = record.decode(streams.read(tmp_path / "run.parquet"), schemas.RUN)
+    run = record.decode(file_io.read(tmp_path / "run.parquet"), schemas.RUN)
     assert np.abs(run.position("plan") - run.position("sent")).max() < 1e-9
 
 
@@ -55,7 +55,7 @@ def test_the_pipe_of_the_readme(tmp_path):
     )
     done = shell(pipe, tmp_path)
     assert done.returncode == 0, done.stderr.decode()
-    found = record.decode(streams.read(tmp_path / "traj.parquet"), schemas.TRAJECTORY)
+    found = record.decode(file_io.read(tmp_path / "traj.parquet"), schemas.TRAJECTORY)
     np.testing.assert_allclose(found.position()[0], [-700, 130, -17.5])
 
 
@@ -80,8 +80,8 @@ def test_the_same_seed_gives_the_same_bytes_through_every_stage(dmpcli, in_proce
 def test_the_sample_runs_are_what_the_tool_makes(dmpcli, tmp_path):
     config = ROOT / "sample_runs" / "recorded.toml"
     dmpcli("record", "-o", "again.parquet", "--config", config, "--seed", "1")
-    again = record.decode(streams.read(tmp_path / "again.parquet"))
-    kept = record.decode(streams.read(RECORDED))
+    again = record.decode(file_io.read(tmp_path / "again.parquet"))
+    kept = record.decode(file_io.read(RECORDED))
     assert again.provenance == kept.provenance
     # Not the bytes: the last bit of a sine may differ between processor types.
     np.testing.assert_allclose(again.position(), kept.position(), atol=1e-6)
@@ -141,7 +141,7 @@ def test_nothing_but_data_goes_to_standard_output(dmpcli):
     assert json.loads(skill)["schema"] == "skill"
     drawn = dmpcli("generalize", "-", "-o", "-", *PAIR, stdin=skill).stdout
     run = dmpcli("execute", "-", "-o", "-", stdin=drawn).stdout
-    assert record.decode(streams.Source("run", run)).schema is schemas.RUN
+    assert record.decode(file_io.Source("run", run)).schema is schemas.RUN
 
 
 NO_INPUT = [b"", b"PAR1", b"\x00\x01\x02"]

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from dmpcli import rotations
 from dmpcli.planning.plan import gap
+from dmpcli.spatial import rotations
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, minimum_jerk, plan, sine, stroke
 
 

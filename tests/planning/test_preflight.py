@@ -5,7 +5,7 @@ import pytest
 
 from dmpcli.errors import RefusedError
 from dmpcli.planning import preflight
-from dmpcli.planning.plan import Stroke
+from dmpcli.planning.plan import PlannedStroke
 from tests.control.streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 
 
@@ -29,7 +29,7 @@ def test_peaks_are_those_of_the_closed_form():
     """Straight minimum jerk: 1.875 L/T, 5.7735 L/T², 60 L/T³."""
     source = stroke()
     u = (START[0] - source.position[:, 0])[:, None]
-    straight = Stroke("0", source.t, START - u * np.array([1.0, 0, 0]), source.rotation)
+    straight = PlannedStroke("0", source.t, START - u * np.array([1.0, 0, 0]), source.rotation)
     checks = by_name(preflight.within_limits(plan(straight), straight, WIDE))
     assert checks["speed"].value == pytest.approx(1.875 * LENGTH / 10, rel=1e-3)
     assert checks["acceleration"].value == pytest.approx(5.7735 * LENGTH / 100, rel=1e-2)
@@ -132,7 +132,7 @@ def test_end_velocity_is_that_of_the_motion_and_goes_with_the_speed():
     """v(t) = 2 + 3 t: the parabola through three samples is exact."""
     t = np.arange(50) * 0.02
     position = START + (2.0 * t + 1.5 * t**2)[:, None] * np.array([0.6, 0.8, 0.0])
-    source = Stroke("0", t, position)
+    source = PlannedStroke("0", t, position)
     start, end = preflight.at_rest(source, 1.0, 0.02, WIDE)
     assert start.value == pytest.approx(2.0)
     assert end.value == pytest.approx(2.0 + 3.0 * t[-1])

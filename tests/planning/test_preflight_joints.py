@@ -11,9 +11,9 @@ from dmpcli.errors import InputError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.kinematics import chain, inverse, models
+from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import preflight
-from dmpcli.planning.plan import Stroke
-from dmpcli.primitives.reach import Reach
+from dmpcli.planning.plan import PlannedStroke
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.simulation.mock import Lab, MockServo
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, refuse_any, stroke
@@ -141,7 +141,7 @@ def test_the_model_that_is_named_is_taken_where_the_robot_tells_none():
 
 def test_a_stroke_without_orientation_is_judged_as_the_arm_holds_it():
     source = stroke(rotated=False)
-    upside_down = Stroke(source.id, source.t, source.position)
+    upside_down = PlannedStroke(source.id, source.t, source.position)
     made, checks = execution.prepare(
         upside_down, ExecuteSettings(), standing(source.position[0]), REACH
     )

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import transfers
-from dmpcli.planning.plan import Stroke
+from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
 from tests.control.streaming_fakes import PEN_DOWN, WIDE, minimum_jerk
 
@@ -26,7 +26,7 @@ def line(name, start, goal, normal=(0.0, 0.0, 1.0), turn=0.0, seconds=4.0):
     start, goal = np.asarray(start, float), np.asarray(goal, float)
     spin = Rotation.from_rotvec(np.outer(turn * u, [0.0, 0.0, 1.0])).as_matrix()
     n = np.asarray(normal, float) / np.linalg.norm(normal)
-    return Stroke(
+    return PlannedStroke(
         name, t, start + u[:, None] * (goal - start), spin @ PEN_DOWN, np.tile(n, (len(t), 1))
     )
 

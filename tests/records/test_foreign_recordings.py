@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
+from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import LAYOUTS, Layout, adapted, suited
 from dmpcli.records.recordings import read
-from dmpcli.records.streams import Source
 from tests.records.foreign import EPOCH, NS, QUATERNION, XYZ, R, T, motive, table
 
 METRES = XYZ / 1000

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.records import journal, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.journal import Journal
 from dmpcli.records.record import Provenance
-from dmpcli.records.rows import Rows
-from dmpcli.records.streams import Source
+from dmpcli.records.row_buffer import RowBuffer
 
 GROUPS = {"t": 1, "place": 3}
 KNOWN = Provenance(
@@ -32,7 +32,7 @@ def add(rows, count):
 
 
 def opened(path, **changes):
-    rows = Rows(GROUPS, ("word",))
+    rows = RowBuffer(GROUPS, ("word",))
     return rows, Journal(path, rows, schemas.DEMONSTRATION, KNOWN)
 
 
@@ -266,8 +266,8 @@ def test_the_header_holds_no_place_and_no_time(tmp_path):
 
 def test_it_is_written_without_pandas():
     code = (
-        "import sys, pathlib, tempfile; from dmpcli.records import journal, rows, record, schemas;"
-        "d = tempfile.TemporaryDirectory(); r = rows.Rows({'t': 1}, ('w',));"
+        "import sys, pathlib, tempfile; from dmpcli.records import journal, row_buffer, record, schemas;"
+        "d = tempfile.TemporaryDirectory(); r = row_buffer.RowBuffer({'t': 1}, ('w',));"
         "j = journal.Journal(pathlib.Path(d.name) / 'j', r, schemas.RUN, record.Provenance('x'));"
         "r.add((1.0,), ('a',)); j.finish({}); j.discard(); print('pandas' in sys.modules)"
     )

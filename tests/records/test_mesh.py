@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from dmpcli.surfaces.mesh import Mesh
 from tests.records.meshes import box, grid, obj, written
 
@@ -457,7 +457,7 @@ def test_no_file_whatever_it_holds_ends_the_process():
 
     from dmpcli.errors import InputError
     from dmpcli.records import mesh
-    from dmpcli.records.streams import Source
+    from dmpcli.records.file_io import Source
     from tests.records.meshes import grid, written
 
     warnings.simplefilter("error")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.records import mesh, mesh_formats
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from tests.records.meshes import box, grid, obj, written
 
 V, F = grid()

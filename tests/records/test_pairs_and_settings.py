@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.records import pairs
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from dmpcli.settings import layers
 from dmpcli.settings.fit import FitSettings
 from dmpcli.settings.generalize import GeneralizeSettings

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.records import pose, surface
+from dmpcli.records.file_io import Source
 from dmpcli.records.pose import Conditioning, Residuals
-from dmpcli.records.streams import Source
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.plane import Plane
 from tests.records.meshes import grid, obj

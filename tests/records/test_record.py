@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.records import record, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
-from dmpcli.records.streams import Source
 
 
 def demonstration(rows=12, **extra):

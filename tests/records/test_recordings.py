@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
 from dmpcli.records import recordings, tables
+from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import LAYOUTS, Layout, adapted
 from dmpcli.records.recordings import stroke
-from dmpcli.records.streams import Source
 
 T = np.linspace(0.0, 1.0, 20)
 XYZ = np.stack([30 * T, np.sin(5 * T), 0 * T + 2.5], axis=1)

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
 from dmpcli.errors import InputError
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.learning import fit
-from dmpcli.records import plane, publish, skill
+from dmpcli.records import json_schema, plane, skill
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
-from dmpcli.records.streams import Source
-from tests.primitives.strokes import circle, paper_stroke
+from tests.dmp.strokes import circle, paper_stroke
 
 REPRODUCTION = skill.Reproduction(
     sha256="0" * 64, duration=10.0, rms=0.1, largest=0.2, end=0.0, smoothing=0.0
@@ -22,7 +22,7 @@ REPRODUCTION = skill.Reproduction(
 
 
 def encoded(stroke=None, **choices):
-    result = fit([stroke or paper_stroke(turning=True)], Choices(**choices))
+    result = fit([stroke or paper_stroke(turning=True)], FitOptions(**choices))
     return result.skill, skill.encode(result.skill, [REPRODUCTION], Provenance("fit"))
 
 
@@ -40,10 +40,10 @@ def test_a_skill_round_trips_exactly(model, stroke):
         np.testing.assert_allclose(after.frame.rotation, before.frame.rotation, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", sorted(publish.SCHEMAS))
+@pytest.mark.parametrize("name", sorted(json_schema.SCHEMAS))
 def test_the_published_json_schema_is_the_models(name):
-    published = (publish.folder() / f"{name}.schema.json").read_text(encoding="utf-8")
-    assert published == publish.text(name), "run make schemas"
+    published = (json_schema.folder() / f"{name}.schema.json").read_text(encoding="utf-8")
+    assert published == json_schema.text(name), "run make schemas"
     jsonschema.Draft202012Validator.check_schema(json.loads(published))
 
 

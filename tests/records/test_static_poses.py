@@ -7,10 +7,10 @@ import pytest
 
 from dmpcli.errors import InputError
 from dmpcli.records import static_poses
+from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
 from dmpcli.records.static_poses import StaticPose
-from dmpcli.records.streams import Source
-from dmpcli.rotations import exp
+from dmpcli.spatial.rotations import exp
 
 
 def some_poses(n=5):

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from dmpcli import rotations
 from dmpcli.errors import InputError
-from dmpcli.records import cylinder, publish, sphere, surface
-from dmpcli.records.streams import Source
+from dmpcli.records import cylinder, json_schema, sphere, surface
+from dmpcli.records.file_io import Source
+from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
@@ -92,7 +92,7 @@ def test_files_keep_to_their_published_schemas():
     import jsonschema
 
     for kind, (document, _) in KINDS.items():
-        jsonschema.validate(document, publish.SCHEMAS[kind]())
+        jsonschema.validate(document, json_schema.SCHEMAS[kind]())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(CYLINDER | {"radius": 0}, cylinder.schema())
     with pytest.raises(jsonschema.ValidationError):

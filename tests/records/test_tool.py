@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmpcli.admittance.payload_identification import Identification, PayloadEstimate
 from dmpcli.errors import InputError
-from dmpcli.primitives.identification import Identification, Payload
-from dmpcli.primitives.wrench import Tool
 from dmpcli.records import tool
-from dmpcli.records.streams import Source
-from dmpcli.rotations import exp
+from dmpcli.records.file_io import Source
 from dmpcli.simulation.mock import PEN
+from dmpcli.spatial.rotations import exp
+from dmpcli.spatial.wrench import Tool
 
 TEXT = tool.encode(PEN)
 
@@ -57,8 +57,10 @@ def test_a_tool_survives_its_file(seed, zeroed):
 
 
 def identified():
-    payload = Payload(6.0, np.array([1.0, -2.0, 45.0]), np.array([0.01, 0.0]), np.arange(6.0))
-    error = Payload(0.01, np.full(3, 0.1), np.full(2, 0.001), np.full(6, 0.01))
+    payload = PayloadEstimate(
+        6.0, np.array([1.0, -2.0, 45.0]), np.array([0.01, 0.0]), np.arange(6.0)
+    )
+    error = PayloadEstimate(0.01, np.full(3, 0.1), np.full(2, 0.001), np.full(6, 0.01))
     used = np.array([True, True, False, True])
     return Identification(payload, error, np.zeros((4, 6)), np.array([2.4, 3.2]), used)
 

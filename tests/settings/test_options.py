@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli import cli
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+from dmpcli.dmp.options import FitOptions
 from dmpcli.errors import InputError
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import Style
 from dmpcli.records import layouts
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.settings.execute import ExecuteSettings
@@ -161,8 +161,8 @@ def test_keys_of_the_presets_are_keys_of_their_models(kind):
 
 
 def test_models_and_mathematics_have_the_same_defaults():
-    assert FitSettings().choices() == Choices()
-    assert GeneralizeSettings().style() == Style()
+    assert FitSettings().choices() == FitOptions()
+    assert GeneralizeSettings().style() == GeneralizeOptions()
     assert [one.default for one in declared("register") if one.name == "max_error"] == [
         registration.LIMIT
     ]

@@ -6,12 +6,12 @@ import pytest
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import DragTeaching as TeachesByDrag
-from dmpcli.primitives import wrench
-from dmpcli.rotations import exp, log
 from dmpcli.simulation.mock import PEN, PEN_DOWN, Faults, Lab, MockSensor, MockServo, Plate, Scene
 from dmpcli.simulation.mock.arms import DraggedArm
 from dmpcli.simulation.mock.contact import contact
 from dmpcli.simulation.mock.parameters import DragParameters, SensorParameters, ServoParameters
+from dmpcli.spatial import wrench
+from dmpcli.spatial.rotations import exp, log
 from tests.instruments.instrument_conformance import check_sensor, check_servo
 
 HOME = np.zeros(3)

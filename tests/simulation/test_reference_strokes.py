@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
-from dmpcli.records.streams import Source
+from dmpcli.records.file_io import Source
 from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes
 

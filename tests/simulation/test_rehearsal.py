@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 from dmpcli.control.drag_loop import Recorder
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.measures.motion import log_dimensionless_jerk, spectral_arc_length
-from dmpcli.measures.wave import stroke_wave
+from dmpcli.metrics.motion import log_dimensionless_jerk, spectral_arc_length
+from dmpcli.metrics.wave_height import stroke_wave
 from dmpcli.settings import record as record_settings
 from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Plate, Scene
 from tests.control.drag_fakes import drag_settings, positions, rehearse

@@ -13,8 +13,8 @@ import potpourri3d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dmpcli.surfaces import all_headings
-from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces import geodesic_search
+from dmpcli.surfaces.surface import Status
 from tests.surfaces import fields
 
 SAMPLES, HEIGHT = 300, 5.0
@@ -289,7 +289,7 @@ def verdict(judge, pairs):
         stroke = drawn.coordinates[i].copy()
         if not charts.creased[i]:  # a line that was stepped along is not the facets' own
             ends = pairs.start[i][None], pairs.goal[i][None]
-            heading, length, _ = (found[0] for found in all_headings.find(judge.mesh, *ends))
+            heading, length, _ = (found[0] for found in geodesic_search.find(judge.mesh, *ends))
             stroke[:, 0] *= length / charts.lengths[i]
         if not judge.confirms(what, pairs, i, heading, length, stroke):
             unconfirmed.append((int(i), what.name))

@@ -8,11 +8,17 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
-from dmpcli.records import mesh, streams
+from dmpcli.records import file_io, mesh
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import pose_bound
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.registration import LIMIT, Part, onto_surface, starts_anywhere, starts_near
+from dmpcli.surfaces.registration import (
+    LIMIT,
+    RegisteredPart,
+    onto_surface,
+    starts_anywhere,
+    starts_near,
+)
 
 PARTS = Path(__file__).parent / "parts"
 FAR_SHIFT, FAR_TURN = 10.0, np.radians(10.0)
@@ -49,7 +55,7 @@ def part_of(name):
     """Return vertices and faces of a part: `wedge` or a file's stem."""
     if name == "wedge":
         return wedge()
-    found = mesh.decode(streams.read(PARTS / f"{name}.stl"))
+    found = mesh.decode(file_io.read(PARTS / f"{name}.stl"))
     return found.V, found.F
 
 
@@ -77,14 +83,14 @@ def near(R, t, centre, rng, angle, shift):
     return turn @ R, R @ centre + t - turn @ R @ centre + shift * step / np.linalg.norm(step)
 
 
-def trial(V, F, part: Part, count, seed, sigma=0.1, anywhere=False) -> Outcome:
+def trial(V, F, part: RegisteredPart, count, seed, sigma=0.1, anywhere=False) -> Outcome:
     """Touch a part and register it.
 
     Parameters
     ----------
     V, F : arrays
         Of the part.
-    part : Part
+    part : RegisteredPart
         The same.
     count : int
         Touched points, random by area.
@@ -116,6 +122,6 @@ def trial(V, F, part: Part, count, seed, sigma=0.1, anywhere=False) -> Outcome:
 
 
 def loaded(name):
-    """Return V, F and the `Part` of a part."""
+    """Return V, F and the `RegisteredPart` of a part."""
     V, F = part_of(name)
-    return V, F, Part.of(Mesh(V, F))
+    return V, F, RegisteredPart.of(Mesh(V, F))

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.measures.deviation import nearest_distance
-from dmpcli.measures.wave import wave_heights
-from dmpcli.primitives.choices import Choices
-from dmpcli.primitives.drawing import draw
-from dmpcli.primitives.drawn_strokes import Style
-from dmpcli.primitives.generalization import Pairs
-from dmpcli.primitives.learning import fit
-from dmpcli.primitives.skill import TaughtSurface
-from dmpcli.primitives.smoothing import Stroke
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+from dmpcli.dmp.generalization import draw
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.skill import TaughtSurface
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.metrics.deviation import nearest_distance
+from dmpcli.metrics.wave_height import wave_heights
 from tests.surfaces import cases
 
 DURATION = 6.0
@@ -59,7 +59,7 @@ class Carried:
 def taught(name, mesh, case, i, choices):
     """Skill of the case's i-th stroke, taught on a mesh."""
     t = np.linspace(0.0, DURATION, case.position.shape[1])
-    stroke = Stroke(t, case.position[i], tool(case.axes[i]))
+    stroke = SmoothedStroke(t, case.position[i], tool(case.axes[i]))
     return fit([stroke], choices, mesh, TaughtSurface("mesh", {})).skill
 
 
@@ -70,7 +70,7 @@ def carried(skill, mesh, case):
     first = np.stack([tool(axes)[0] for axes in case.axes])
     pairs = Pairs(start, goal, first)
     rate = (samples - 1) / DURATION
-    style = Style(rate=rate, orientation="surface")
+    style = GeneralizeOptions(rate=rate, orientation="surface")
     drawn = draw(skill, pairs, np.full(count, skill.duration), mesh, style)
     found = []
     for i, stroke in enumerate(drawn):
@@ -97,7 +97,7 @@ def carried(skill, mesh, case):
 
 
 def _rotations(euler):
-    from dmpcli import rotations
+    from dmpcli.spatial import rotations
 
     return rotations.from_euler(euler)
 
@@ -108,5 +108,5 @@ def meshes(faces):
     return made, {name: cases.largest_error(name, mesh) for name, mesh in made.items()}
 
 
-RIDGE = Choices(regression="ridge")
-TIGHT = Choices(tolerance=0.02)
+RIDGE = FitOptions(regression="ridge")
+TIGHT = FitOptions(tolerance=0.02)

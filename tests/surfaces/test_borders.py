@@ -5,8 +5,8 @@ import pytest
 
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Status
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Status
 from tests.surfaces import cases, fields
 
 RADIUS = 60.0

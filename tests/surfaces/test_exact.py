@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from dmpcli import rotations
+from dmpcli.spatial import rotations
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
-from dmpcli.surfaces.protocol import Status, Surface
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Status, Surface
 
 R = rotations.exp(np.array([0.3, -0.5, 0.8]))
 CENTRE = np.array([-550.0, 40.0, -20.0])

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.plane import Plane
-from dmpcli.surfaces.protocol import Status
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Status
 from tests.surfaces import cases, fields
 
 S = np.linspace(0.0, 1.0, 200)

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmpcli.surfaces import last_check, unfolding
+from dmpcli.surfaces import last_check, straightest_geodesics
 from dmpcli.surfaces.last_check import Feet, refusals
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces.surface import Status
 from tests.records.meshes import box
 from tests.surfaces import fields
 from tests.surfaces.test_mesh import folded
-from tests.surfaces.test_roughness import part
+from tests.surfaces.test_mesh_noise import part
 
 LENGTH = 60.0
 
@@ -142,7 +142,7 @@ def test_strokes_anywhere_on_machined_parts_are_drawn_right_or_refused(name, rea
     start = np.einsum("ni,nij->nj", rng.dirichlet([1, 1, 1], 60), mesh.corners[face])
     normal = mesh.face_normals[face]
     heading = np.cross(normal, rng.normal(size=(60, 3)))
-    end = unfolding.walk(mesh, start, heading, np.full(60, reach))
+    end = straightest_geodesics.walk(mesh, start, heading, np.full(60, reach))
     assert end.arrived.all()
     charts = mesh.charts(start, end.position, normal)
     coordinates = fields.strokes(charts.lengths, 300, height=5.0)

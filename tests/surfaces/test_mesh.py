@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Status
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.surface import Status
 from tests.surfaces import fields
 
 

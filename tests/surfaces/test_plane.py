@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli import rotations
+from dmpcli.spatial import rotations
 from dmpcli.surfaces import plane
 from dmpcli.surfaces.plane import Plane, PlaneCharts
 

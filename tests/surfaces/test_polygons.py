@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmpcli import rotations
+from dmpcli.spatial import rotations
 from dmpcli.surfaces import polygons
 
 U = [[0, 0], [60, 0], [60, 40], [40, 40], [40, 10], [20, 10], [20, 40], [0, 40]]

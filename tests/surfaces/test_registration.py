@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from dmpcli.errors import InputError
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.registration import (
-    Part,
+    RegisteredPart,
     from_pairs,
     onto_surface,
     starts_anywhere,
@@ -25,7 +25,7 @@ SEEDS = st.integers(0, 10_000)
 
 def laid(points, V, F, R, t):
     """The pose found near another."""
-    return onto_surface(points, Part.of(Mesh(V, F)), starts_near(points, R, t))
+    return onto_surface(points, RegisteredPart.of(Mesh(V, F)), starts_near(points, R, t))
 
 
 @settings(max_examples=50, deadline=None)
@@ -220,7 +220,7 @@ def test_in_all_orientations_the_pose_is_found_without_a_start():
 def test_a_box_in_all_orientations_has_a_rival_that_looks_the_same():
     rng = np.random.default_rng(11)
     V, F = box((100.0, 60.0, 40.0))
-    part = Part.of(Mesh(V, F))
+    part = RegisteredPart.of(Mesh(V, F))
     points = touched_on(V, F, 40, rng) + 0.05 * rng.standard_normal((40, 3))
     found = onto_surface(points, part, starts_anywhere(points, part))
     assert found.rival.near
@@ -239,7 +239,7 @@ def test_directions_of_approach_tell_sides_of_a_thin_plate_apart():
     points = np.concatenate([touched_on(V, F, 9, rng, top), touched_on(V, F, 10, rng, sides)])
     points[9:, 2] = 2.98
     normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (9, 1)), np.full((10, 3), np.nan)])
-    part = Part.of(Mesh(V, F))
+    part = RegisteredPart.of(Mesh(V, F))
     low = np.array([0.0, 0.0, 3.0])
     noisy = points + 0.03 * rng.standard_normal(points.shape)
     blind = onto_surface(noisy, part, starts_near(noisy, np.eye(3), low))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dmpcli import rotations
-from dmpcli.surfaces.mending import mended
+from dmpcli.spatial import rotations
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Status
+from dmpcli.surfaces.mesh_repair import mended
+from dmpcli.surfaces.surface import Status
 from tests.records.meshes import box, grid
 
 

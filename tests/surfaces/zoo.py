@@ -10,8 +10,8 @@ import numpy as np
 import trimesh
 from manifold3d import CrossSection, FillRule, JoinType, Manifold
 
+from dmpcli.records.file_io import Source
 from dmpcli.records.mesh import decode
-from dmpcli.records.streams import Source
 from dmpcli.surfaces.mesh import Mesh
 
 Part = Callable[[], Manifold]

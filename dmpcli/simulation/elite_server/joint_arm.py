@@ -10,7 +10,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import Arm
-from dmpcli.primitives.wrench import Tool
+from dmpcli.spatial.wrench import Tool
 
 LAG = 0.02
 """Time constant of each joint's servo, s; the maker states none."""

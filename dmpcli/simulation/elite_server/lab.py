@@ -15,7 +15,6 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.kinematics import inverse
 from dmpcli.kinematics.models import Arm, model
-from dmpcli.primitives.wrench import Tool
 from dmpcli.simulation.elite_server import monitor
 from dmpcli.simulation.elite_server.behaviour import Behaviour
 from dmpcli.simulation.elite_server.controller import SimulatedController
@@ -24,6 +23,7 @@ from dmpcli.simulation.elite_server.joint_arm import LAG, JointArm
 from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
 from dmpcli.simulation.mock.contact import Solid, Wrist, contact
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN, SensorParameters
+from dmpcli.spatial.wrench import Tool
 
 ROBOT_MODEL = "ec66"
 
@@ -32,7 +32,7 @@ READY = np.radians([0.0, -110.0, -110.0, -50.0, -90.0, 90.0])
 
 
 @dataclass(frozen=True)
-class Setting:
+class LabParameters:
     """What the virtual lab is made of.
 
     Attributes
@@ -81,7 +81,7 @@ class VirtualLab:
 
     Parameters
     ----------
-    setting : Setting
+    setting : LabParameters
     hand : VisitingHand, optional
     clock : callable
         Time, s.
@@ -102,7 +102,7 @@ class VirtualLab:
 
     def __init__(
         self,
-        setting: Setting,
+        setting: LabParameters,
         hand: VisitingHand | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:

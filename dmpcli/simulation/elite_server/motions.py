@@ -12,8 +12,8 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm
-from dmpcli.rotations import exp_one, log_one
 from dmpcli.simulation.elite_server.joint_arm import Leg
+from dmpcli.spatial.rotations import exp_one, log_one
 
 Underrun = Literal["hold", "decelerate", "alarm"]
 Jump = Literal["alarm", "ignore", "clamp"]

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.rotations import from_euler, to_euler
+from dmpcli.spatial.rotations import from_euler, to_euler
 
 Euler = Literal["xyz", "zyx"]
 """Which rx, ry, rz a controller means: R = Rx(rx) Ry(ry) Rz(rz), or R = Rz(rz) Ry(ry) Rx(rx)."""

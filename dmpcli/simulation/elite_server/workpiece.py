@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.protocol import Surface, towards
+from dmpcli.surfaces.surface import Surface, towards
 
 _DEEPEST = 20.0
 """mm: whatever lies deeper is not in this surface but behind another one."""

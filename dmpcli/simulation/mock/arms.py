@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.rotations import exp_one, log_one
 from dmpcli.simulation.mock.parameters import DragParameters, ServoParameters
+from dmpcli.spatial.rotations import exp_one, log_one
 
 
 class ServoArm:

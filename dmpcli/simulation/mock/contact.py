@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.primitives import wrench
-from dmpcli.primitives.wrench import Tool
 from dmpcli.simulation.mock.parameters import SensorParameters
+from dmpcli.spatial import wrench
+from dmpcli.spatial.wrench import Tool
 
 # Readings whose noise is drawn at once: the loop that asks for them has other work to do.
 _DRAWN = 256

@@ -9,8 +9,8 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
-from dmpcli.rotations import from_euler
 from dmpcli.simulation.mock.parameters import Plate, Scene
+from dmpcli.spatial.rotations import from_euler
 
 KEYS = {
     "x": "mm, where the TCP stands at the beginning",

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.primitives.wrench import Tool
-from dmpcli.rotations import from_euler
+from dmpcli.spatial.rotations import from_euler
+from dmpcli.spatial.wrench import Tool
 
 PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
 """Attitude of a pen that points straight down, Rx(π)."""

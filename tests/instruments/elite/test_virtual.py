@@ -14,9 +14,9 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Stroke, make
+from dmpcli.planning.plan import PlannedStroke, make
 from dmpcli.simulation.elite_server import faults
-from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.service import ControllerService
 from dmpcli.simulation.mock import PEN
 
@@ -30,7 +30,7 @@ class Bench:
 
     def __init__(self, *specifications, tool=PEN, **options):
         said = faults.parse(specifications)
-        setting = Setting(START, habits=said.habits, events=said.events)
+        setting = LabParameters(START, habits=said.habits, events=said.events)
         self.service = ControllerService(VirtualLab(setting))
         # Both ends and the loop share one process here: nothing is said about how fast they are.
         slow = {"monitor_port": self.service.monitor_port, "lookahead": 0.5, "oldest": 0.5}
@@ -48,7 +48,7 @@ class Bench:
         s = t / duration
         u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         way = state.position + u[:, None] * [20.0, 10.0, 0.0]
-        stroke = Stroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
+        stroke = PlannedStroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
         here = (state.position, state.rotation)
         plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
         arm = ReadyArm(self.servo, info, self.clock)

@@ -8,7 +8,7 @@ import pytest
 from dmpcli.errors import InstrumentError
 from dmpcli.simulation.elite_server.behaviour import Behaviour
 from dmpcli.simulation.elite_server.faults import Event
-from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.service import ControllerService, TcpService
 from dmpcli.simulation.mock.parameters import PEN
 from tests.simulation.elite_server.virtual_fakes import START, Client
@@ -19,7 +19,7 @@ def serve():
     services = []
 
     def make(**changes):
-        lab = VirtualLab(Setting(**({"position": START, "tool": PEN} | changes)))
+        lab = VirtualLab(LabParameters(**({"position": START, "tool": PEN} | changes)))
         services.append(ControllerService(lab))
         return services[-1]
 
@@ -167,7 +167,9 @@ def test_a_port_that_is_taken_is_refused_by_name():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(InstrumentError, match=rf"--monitor-port {port} on 127.0.0.1"):
-            ControllerService(VirtualLab(Setting(position=START)), robot_port=0, monitor_port=port)
+            ControllerService(
+                VirtualLab(LabParameters(position=START)), robot_port=0, monitor_port=port
+            )
 
 
 def test_a_closed_service_serves_no_longer():

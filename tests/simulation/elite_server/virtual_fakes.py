@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dmpcli.simulation.elite_server.behaviour import Behaviour
-from dmpcli.simulation.elite_server.lab import Setting, VirtualLab
+from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.motions import Policies
 from dmpcli.simulation.mock.parameters import PEN, SensorParameters
 
@@ -32,7 +32,7 @@ class Bench:
         self.time = Time()
         changes = {"position": START, "tool": PEN, "sensor": QUIET, "lag": lag} | changes
         habits = Behaviour(policies=policies or Policies())
-        self.lab = VirtualLab(Setting(**({"habits": habits} | changes)), hand, self.time)
+        self.lab = VirtualLab(LabParameters(**({"habits": habits} | changes)), hand, self.time)
         self.controller, self.arm = self.lab.controller, self.lab.controller.arm
 
     def call(self, method: str, **params: Any) -> Any:

@@ -1,0 +1,243 @@
+"""What a report says of a batch: distributions, the worst strokes by name, why pairs failed.
+
+Nothing here grows with the batch but a few numbers per stroke; what every stroke says on its own
+goes into CSV files as it is measured.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TextIO
+
+import numpy as np
+
+from dmpcli.arrays import Floats, Integers
+from dmpcli.metrics import paper_values
+from dmpcli.records.dataset import BatchFolder, states_of
+from dmpcli.reporting.batch_measures import (
+    FIGURES,
+    MeasuredBlock,
+    MeasurementContext,
+    measured_parts,
+)
+from dmpcli.reporting.stroke import ReportedStroke
+from dmpcli.reporting.stroke_measures import Row, distribution
+
+WORST = 5
+"""Strokes named for each figure."""
+
+MOST_DRAWN = 200
+"""Strokes of a batch that are kept for the figures of all strokes: an even choice."""
+
+ALIKE = 1e-6
+"""Where figures differ by no more than this none is the worst, mm or degrees."""
+
+BINS = 60
+
+RANKED = (
+    *("wave_height", "nearest_max", "start_error", "goal_error"),
+    *("surface_distance_max", "surface_tilt_max"),
+)
+"""Figures whose worst strokes are named: the wave height farthest from the demonstration's (from
+the median where there is none), and of the others the largest."""
+
+HISTOGRAMS = (
+    *("wave_height", "wave_spread", "nearest_rms", "nearest_max", "phase_rms"),
+    *("start_error", "goal_error", "length", "duration", "ldlj", "sparc"),
+    *("surface_distance_max", "surface_tilt_max", "surface_length_change"),
+)
+
+STROKES = ["file", "id", "part", *FIGURES]
+"""Header of the CSV file with a row per stroke."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Open text files that the strokes' own numbers go to; `strokes` those of batches."""
+
+    waves: TextIO
+    strokes: TextIO | None
+
+
+@dataclass
+class MeasuredBatch:
+    """A batch as measured.
+
+    Attributes
+    ----------
+    batch : BatchFolder
+    label : str
+    sight : MeasurementContext
+    table : array, shape (B, len(FIGURES))
+        NaN where a figure does not exist.
+    shown : list of ReportedStroke
+        An even choice, and what lies at the places of the paper.
+    """
+
+    batch: BatchFolder
+    label: str
+    sight: MeasurementContext
+    table: Floats
+    shown: list[ReportedStroke] = field(default_factory=list)
+
+    def values(self, name: str) -> Floats:
+        """Return the values of one figure, shape (B,), NaN where there is none."""
+        return np.asarray(self.table[:, FIGURES.index(name)])
+
+    @property
+    def target(self) -> float | None:
+        """Wave height of the demonstration, mm."""
+        return self.sight.reference.wave.mean if self.sight.reference else None
+
+    def entry(self) -> Row:
+        """Return what the report's document says of it."""
+        states, failures = states_of(self.batch)
+        return {
+            "count": len(self.batch),
+            "statistics": {name: distribution(_known(self.values(name))) for name in FIGURES},
+            "histograms": {name: histogram(_known(self.values(name))) for name in HISTOGRAMS},
+            "worst": {name: self.worst(name) for name in RANKED},
+            "states": states,
+            "failures": failures,
+        }
+
+    def worst(self, name: str) -> list[Row]:
+        """Return the worst strokes by one figure, the very worst first."""
+        return [
+            {
+                "id": self.batch.ids[row].as_py(),
+                "part": self.batch.files[int(self.batch.part[row])],
+                "value": float(self.values(name)[row]),
+            }
+            for row in self.worst_rows(name)
+        ]
+
+    def worst_rows(self, name: str) -> list[int]:
+        """Rows with the worst values of one figure, the very worst first; none if all are alike."""
+        values = self.values(name)
+        known = np.flatnonzero(np.isfinite(values))
+        if not len(known):
+            return []
+        off = values[known]
+        if name == "wave_height":
+            usual = np.median(off) if self.target is None else self.target
+            off = np.abs(off - usual)
+        if np.ptp(off) <= ALIKE:
+            return []
+        # Equal ones in the order of the table.
+        return [int(row) for row in known[np.argsort(-off, kind="stable")[:WORST]]]
+
+    def strokes(self, rows: Sequence[int]) -> list[ReportedStroke]:
+        """Read some strokes once more, as they are drawn."""
+        found: dict[int, ReportedStroke] = {}
+        for some in measured_parts(self.batch, self.label, self.sight, np.array(rows)):
+            found |= {int(row): some.stroke(i) for i, row in enumerate(some.rows)}
+        return [found[row] for row in rows]
+
+
+def measure(
+    batch: BatchFolder,
+    label: str,
+    sight: MeasurementContext,
+    tables: Tables | None,
+    advance: Callable[[int], None],
+) -> MeasuredBatch:
+    """Measure all strokes of a batch.
+
+    Parameters
+    ----------
+    batch : BatchFolder
+    label : str
+        What to call it.
+    sight : MeasurementContext
+        What to measure against.
+    tables : Tables, optional
+        Files for the numbers of every stroke.
+    advance : callable
+        Told how many strokes are done.
+
+    Raises
+    ------
+    InputError
+        A part is damaged or not the batch's; by name.
+    """
+    many = MeasuredBatch(batch, label, sight, np.full((len(batch), len(FIGURES)), np.nan))
+    chosen = _chosen(batch)
+    shown: dict[int, ReportedStroke] = {}
+    for some in measured_parts(batch, label, sight):
+        many.table[some.rows] = some.table
+        for i in np.flatnonzero(np.isin(some.rows, chosen)).tolist():
+            shown[int(some.rows[i])] = some.stroke(i)
+        if tables is not None:
+            ids = batch.ids.take(some.rows).to_pylist()
+            tables.waves.writelines(_wave_rows(some, label, ids))
+            assert tables.strokes is not None
+            tables.strokes.writelines(_stroke_rows(some, label, ids, batch))
+        advance(len(some.rows))
+    many.shown = [shown[row] for row in sorted(shown)]
+    return many
+
+
+def _chosen(batch: BatchFolder) -> Integers:
+    """Rows of an even choice of strokes, and of those at the paper's places."""
+    step = max(1, -(-len(batch) // MOST_DRAWN))
+    rows = [np.arange(0, len(batch), step)]
+    if batch.start is not None and batch.goal is not None:
+        for experiment in paper_values.EXPERIMENTS:
+            off = np.linalg.norm(batch.start - experiment.start, axis=1)
+            off = np.maximum(off, np.linalg.norm(batch.goal - experiment.goal, axis=1))
+            rows.append(np.flatnonzero(off <= paper_values.TOLERANCE)[:MOST_DRAWN])
+    return np.unique(np.concatenate(rows))
+
+
+def _known(values: Floats) -> Floats:
+    return values[np.isfinite(values)]
+
+
+def histogram(values: Floats, low: float | None = None, high: float | None = None) -> Row | None:
+    """Counts of values (k,) in bins of equal width, over their own range; None without values."""
+    if not len(values):
+        return None
+    low = float(values.min()) if low is None else low
+    high = float(values.max()) if high is None else high
+    least = 1e-6 * max(1.0, abs(low), abs(high))
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        # Distances are not negative, nor are the bins that they fall into.
+        low = middle - 0.5 * least if low < 0.0 else max(0.0, middle - 0.5 * least)
+        high = low + least
+    counts, edges = np.histogram(values, BINS, (low, high))
+    return {"edges": edges.tolist(), "counts": counts.tolist()}
+
+
+def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> Iterable[str]:
+    """Every wave height, as in `document.write_waves`."""
+    waves = some.waves
+    ends = waves.ends
+    stroke = waves.stroke[ends]
+    t = np.interp(waves.index, np.arange(len(some.t)), some.t)
+    number = np.arange(len(ends)) - np.searchsorted(stroke, stroke) + 1
+    numbers = np.column_stack(
+        [waves.heights, t[ends - 1], t[ends], waves.value[ends - 1], waves.value[ends]]
+    )
+    names = [_cell(f"{label}[{name}]") for name in ids]
+    form = ",".join(["%s", some.role, "%d"] + ["%.6f"] * numbers.shape[1]) + "\n"
+    for i, k, row in zip(stroke.tolist(), number.tolist(), numbers.tolist(), strict=True):
+        yield form % (names[i], k, *row)
+
+
+def _stroke_rows(
+    some: MeasuredBlock, label: str, ids: Sequence[str], batch: BatchFolder
+) -> Iterable[str]:
+    """The figures of every stroke; nothing where there is none."""
+    files = [batch.files[part] for part in batch.part[some.rows].tolist()]
+    form = ",%.6f" * len(FIGURES) + "\n"
+    for name, file, numbers in zip(ids, files, some.table.tolist(), strict=True):
+        figures = (form % tuple(numbers)).replace("nan", "")
+        yield f"{_cell(label)},{_cell(name)},{_cell(file)}{figures}"
+
+
+def _cell(text: str) -> str:
+    """Return a text as a cell of a CSV file."""
+    if any(sign in text for sign in ',"\r\n'):
+        return '"' + text.replace('"', '""') + '"'
+    return text

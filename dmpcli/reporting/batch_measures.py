@@ -1,0 +1,442 @@
+"""A batch measured part by part: some numbers of each stroke, and the few strokes to be drawn."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
+from dmpcli.dmp.contact_heights import ContactHeights
+from dmpcli.errors import InputError
+from dmpcli.metrics.deviation import Taught
+from dmpcli.metrics.motion import motions
+from dmpcli.metrics.wave_height import ManyWaves, many_waves
+from dmpcli.records import dataset, schemas, tolerance_mark
+from dmpcli.records import learning_record as lessons
+from dmpcli.records.dataset import BatchFolder, Piece
+from dmpcli.records.learning_record import Lesson
+from dmpcli.reporting import stroke_measures as measured
+from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
+from dmpcli.reporting.stroke import LEAST, ReportedStroke, as_drawn
+from dmpcli.reporting.strokes import over_of, role_of
+from dmpcli.spatial import rotations
+from dmpcli.surfaces import plane
+
+FIGURES = (
+    *("wave_height", "wave_spread", "nearest_rms", "nearest_max", "phase_rms", "phase_max"),
+    *("length", "duration", "peak_speed", "ldlj", "sparc", "start_error", "goal_error"),
+    *(f"surface_{key}" for key in measured.ON_SURFACE),
+)
+"""Columns of `Measured.table`."""
+
+_SAMPLES = 1 << 16
+"""Samples worked on at once: what is in work stays in the processor's cache."""
+
+_MOST_WORKERS = 4
+
+
+@dataclass(frozen=True)
+class MeasuredBlock:
+    """Strokes that were measured together.
+
+    Attributes
+    ----------
+    rows : array of int, shape (k,)
+        Of the batch.
+    role : str
+    table : array, shape (k, len(FIGURES))
+        NaN where a figure does not exist.
+    t : array, shape (n,)
+        s, of all of them.
+    waves : ManyWaves
+    stroke : callable
+        One of them as it is drawn, by its place.
+    """
+
+    rows: Integers
+    role: str
+    table: Floats
+    t: Floats
+    waves: ManyWaves
+    stroke: Callable[[int], ReportedStroke]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """How a skill saw its recordings, and what it changed where it drew; see `ReportedStroke`."""
+
+    lesson: Lesson | None = None
+    over: ContactHeights | None = None
+    size: float = 1.0
+    turn: float = 0.0
+
+
+_AS_TAUGHT = Drawn()
+
+
+@dataclass(frozen=True)
+class MeasurementContext:
+    """What strokes are measured against.
+
+    Attributes
+    ----------
+    reference : ReportedStroke, optional
+        The demonstration.
+    ground : ReportSurface, optional
+        The surface of the report.
+    normal : array, shape (3,), optional
+        Of a surface that is a plane.
+    drawn : Drawn
+        By which skill the demonstration is seen.
+    """
+
+    reference: ReportedStroke | None = None
+    ground: ReportSurface | None = None
+    normal: Floats | None = None
+    drawn: Drawn = _AS_TAUGHT
+    _others: dict[Drawn, "MeasurementContext"] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+
+    def of_drawn(self, facts: Mapping[str, Any]) -> "MeasurementContext":
+        """Return it as seen by the skill that drew a part, whose facts these are."""
+        size, turn = float(facts.get("size", 1.0)), float(facts.get("turn", 0.0))
+        drawn = Drawn(lessons.of_facts(facts), over_of(facts), size, turn)
+        if drawn == self.drawn or self.reference is None:
+            return self
+        if drawn not in self._others:
+            at = self.reference
+            if at.seen_by is not None and drawn.lesson is not None:
+                at = at.seen_by(drawn.lesson)
+            self._others[drawn] = replace(self, reference=at, drawn=drawn, _others={})
+        return self._others[drawn]
+
+    @cached_property
+    def taught(self) -> Taught | None:
+        """The demonstration in its own chart, as it was to be drawn."""
+        at = self.reference
+        if at is None or at.chart is None or at.elsewhere:
+            return None
+        d = self.drawn
+        return Taught(at.t, as_drawn(at.chart, d.over, d.size, d.turn))
+
+
+def measured_parts(
+    batch: BatchFolder, label: str, sight: MeasurementContext, only: Integers | None = None
+) -> Iterator[MeasuredBlock]:
+    """Measure the strokes of a batch, in an order that follows its parts.
+
+    Parameters
+    ----------
+    batch : BatchFolder
+    label : str
+        What to call it.
+    sight : MeasurementContext
+    only : array of int, optional
+        Only these rows of the batch.
+
+    Raises
+    ------
+    InputError
+        A part is damaged, is not the batch's, or holds a stroke that cannot be measured.
+    """
+    more = schemas.NORMAL if sight.ground is None else (*schemas.NORMAL, *schemas.EULER_ANGLES)
+    parts = None if only is None else np.unique(batch.part[only]).tolist()
+
+    def tasks() -> Iterator[Callable[[], MeasuredBlock]]:
+        for piece in dataset.pieces(batch, more, parts):
+            for which, t in _alike(piece):
+                if only is not None:
+                    which = which[np.isin(piece.rows[which], only)]
+                size = max(1, _SAMPLES // len(t))
+                size = size if sight.ground is None else min(size, AT_ONCE)
+                for first in range(0, len(which), size):
+                    some = which[first : first + size]
+                    yield partial(_measured, batch, piece, some, t, label, sight)
+
+    return _in_turn(tasks())
+
+
+def _measured(
+    batch: BatchFolder,
+    piece: Piece,
+    which: Integers,
+    t: Floats,
+    label: str,
+    sight: MeasurementContext,
+) -> MeasuredBlock:
+    return _Block(batch, piece, which, t, label, sight).measured()
+
+
+def _in_turn(tasks: Iterator[Callable[[], MeasuredBlock]]) -> Iterator[MeasuredBlock]:
+    """Do tasks on several cores, few at a time; what they give comes in their order."""
+    workers = min(os.cpu_count() or 1, _MOST_WORKERS)
+    with ThreadPoolExecutor(workers) as pool:
+        begun: deque[Future[MeasuredBlock]] = deque()
+        try:
+            for task in tasks:
+                begun.append(pool.submit(task))
+                if len(begun) > 2 * workers:
+                    yield begun.popleft().result()
+            while begun:
+                yield begun.popleft().result()
+        finally:
+            for future in begun:
+                future.cancel()
+
+
+def _alike(piece: Piece) -> Iterator[tuple[Integers, Floats]]:
+    """Trajectories that share their times, by their places in the piece, and the times."""
+    t = piece.columns["t"]
+    counts = np.diff(piece.first)
+    for n in np.unique(counts).tolist():
+        which = np.flatnonzero(counts == n)
+        if n < LEAST:
+            raise InputError(
+                f"{piece.name}: a stroke of {n} samples cannot be measured; {LEAST} are needed"
+            )
+        times = _gathered(t, piece.first[which], n)
+        back = np.flatnonzero(~(times[:, 1:] > times[:, :-1]).all(axis=1))
+        if len(back):
+            one = times[back[0]]
+            row = int(piece.first[which[back[0]]] + np.argmax(one[1:] <= one[:-1])) + 2
+            raise InputError(
+                f"{piece.name}: column 't', row {row}: time does not increase; sort the rows"
+            )
+        if (times == times[0]).all():
+            yield which, times[0] - times[0, 0]
+            continue
+        groups: dict[bytes, list[int]] = {}
+        for i, one in enumerate(times):
+            groups.setdefault(one.tobytes(), []).append(i)
+        for some in groups.values():
+            yield which[some], times[some[0]] - times[some[0], 0]
+
+
+def _gathered(column: AnyArray, first: Integers, n: int) -> Floats:
+    """Samples of trajectories of n samples each, shape (k, n)."""
+    begin, end = int(first[0]), int(first[-1]) + n
+    if end - begin == len(first) * n:
+        return np.asarray(column[begin:end]).reshape(-1, n)
+    return np.asarray(column[first[:, None] + np.arange(n)])
+
+
+class _Block:
+    """Some trajectories of a piece that share their times.
+
+    Parameters
+    ----------
+    which : array of int, shape (k,)
+        Their places in the piece.
+    t : array, shape (n,)
+        s, from 0.
+    """
+
+    def __init__(
+        self,
+        batch: BatchFolder,
+        piece: Piece,
+        which: Integers,
+        t: Floats,
+        label: str,
+        sight: MeasurementContext,
+    ) -> None:
+        self.batch, self.piece, self.t, self.label = batch, piece, t, label
+        self.sight = sight.of_drawn(piece.facts)
+        self.rows, self.first = piece.rows[which], piece.first[which]
+        self.facts = piece.facts
+        self.role = role_of(piece.facts)
+        self.position = self._three(schemas.POSITION)
+        ends = batch.start, batch.goal
+        self.intended = ends[0] is not None and ends[1] is not None
+        self.start = self.position[..., 0].T if ends[0] is None else ends[0][self.rows]
+        self.goal = self.position[..., -1].T if ends[1] is None else ends[1][self.rows]
+        self.length = np.linalg.norm(self.goal - self.start, axis=1)
+        self.closed = self._closed()
+        self.known, self.axes = self._axes()
+        self.aims = self._aims()
+
+    def _three(self, names: Sequence[str]) -> Floats:
+        n = len(self.t)
+        return np.stack([_gathered(self.piece.columns[c], self.first, n) for c in names])
+
+    def _closed(self) -> Booleans:
+        if "closed" in self.facts:
+            said: Booleans = np.full(len(self.rows), bool(self.facts["closed"]))
+        else:
+            said = np.array([plane.is_closed(path.T) for path in self.position.swapaxes(0, 1)])
+        return np.asarray(said | (self.length == 0.0))
+
+    def _axes(self) -> tuple[Booleans, Floats]:
+        """Which strokes have a plane, shape (k,), and its chart axes, shape (k, 3, 3)."""
+        count = len(self.rows)
+        normal = np.full((count, 3), np.nan)
+        if self.batch.normal is not None:
+            normal = self.batch.normal[self.rows].copy()
+        unknown = ~np.isfinite(normal).all(axis=1)
+        if self.facts.get("normal") is not None:
+            normal[unknown] = self.facts["normal"]
+        elif unknown.any() and self.piece.has(*schemas.NORMAL):
+            turning = self._three(schemas.NORMAL)
+            level = unknown & (np.ptp(turning, axis=2).max(axis=0) < 1e-6)
+            normal[level] = turning[:, level, 0].T
+        unknown = ~np.isfinite(normal).all(axis=1)
+        if self.sight.normal is not None:
+            away = ~unknown & (normal @ self.sight.normal < 0.0)
+            normal = np.where(away[:, None], -self.sight.normal, self.sight.normal)
+            unknown[:] = False
+        axes = np.full((count, 3, 3), np.nan)
+        if unknown.any() and not self.piece.has(*schemas.NORMAL):
+            for i in np.flatnonzero(unknown):
+                axes[i] = plane.stroke_axes(self.position[:, i].T)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        line = ~unknown & ~self.closed
+        e_u = (self.goal[line] - self.start[line]) / self.length[line, None]
+        axes[line] = plane.open_axes(e_u, normal[line])
+        for i in np.flatnonzero(~unknown & self.closed):
+            axes[i] = plane.closed_axes(normal[i])
+        return np.isfinite(axes[:, 0, 0]), axes
+
+    def measured(self) -> MeasuredBlock:
+        """Measure the strokes."""
+        table = np.full((len(self.rows), len(FIGURES)), np.nan)
+        column = {name: table[:, i] for i, name in enumerate(FIGURES)}
+        gap = self.position - self.start.T[:, :, None]
+        place = np.einsum("bji,jbn->ibn", self.axes, gap)
+        moved = motions(self.t, self.position, *self.aims)
+        for name in ("length", "peak_speed", "ldlj", "sparc"):
+            column[name][:] = getattr(moved, name)
+        if self.intended:
+            column["start_error"][:] = moved.start_error
+            column["goal_error"][:] = moved.goal_error
+        column["duration"][:] = self.t[-1]
+        flat = np.where(self.known[:, None], place[1], 0.0)
+        waves = many_waves(flat, self.length, self.closed)
+        column["wave_height"][:], column["wave_spread"][:] = waves.mean, waves.spread
+        self._compare(column, self.known, place[:, self.known], self._stretch())
+        if self.sight.ground is None:
+            return MeasuredBlock(self.rows, self.role, table, self.t, waves, self._stroke)
+        strokes = placed(
+            [self._stroke(i) for i in range(len(self.rows))],
+            self.sight.ground,
+            self.sight.reference,
+        )
+        self._place(column, strokes)
+        waves = ManyWaves.joined([stroke.wave for stroke in strokes])
+        return MeasuredBlock(self.rows, self.role, table, self.t, waves, strokes.__getitem__)
+
+    def _aims(self) -> tuple[Floats, Floats]:
+        """Points where the strokes should begin and end, shape (k, 3) each, mm."""
+        heights = self.facts.get("end_heights")
+        if heights is None:
+            return self.start, self.goal
+        up = np.repeat(self.axes[:, None, :, 2], 2, axis=1)
+        if self.piece.has(*schemas.NORMAL):
+            turning = self._three(schemas.NORMAL)[..., [0, -1]].transpose(1, 2, 0)
+            up = np.where(np.isfinite(turning), turning, up)
+        return self.start + heights[0] * up[:, 0], self.goal + heights[1] * up[:, 1]
+
+    def _stretch(self) -> Floats:
+        """Start-goal distances of the strokes with a plane over the demonstration's."""
+        at = self.sight.reference
+        if at is None or at.closed:
+            return np.ones(int(self.known.sum()))
+        return np.asarray(np.where(self.closed, 1.0, self.length / at.length)[self.known])
+
+    def _compare(
+        self, column: dict[str, Floats], which: Booleans, place: Floats, stretch: Floats
+    ) -> None:
+        """Fill in how far some of the strokes lie from the demonstration."""
+        taught = self.sight.taught
+        if taught is None or not which.any():
+            return
+        found = taught.deviations(self.t, place, stretch)
+        assert self.sight.reference is not None
+        rms, largest = self.sight.reference.lost
+        column["nearest_rms"][which] = np.hypot(found.nearest_rms, rms)
+        column["nearest_max"][which] = np.maximum(found.nearest_max, largest)
+        column["phase_rms"][which] = found.phase_rms
+        column["phase_max"][which] = found.phase_max
+
+    def _place(self, column: dict[str, Floats], strokes: Sequence[ReportedStroke]) -> None:
+        """Fill in how the strokes lie on the surface; on a curved one they are compared there."""
+        for i, stroke in enumerate(strokes):
+            row = measured.on_surface(stroke) or {}
+            for key in measured.ON_SURFACE:
+                value = row.get(key)
+                column[f"surface_{key}"][i] = np.nan if value is None else value
+            mean, spread = stroke.wave.mean, stroke.wave.spread
+            column["wave_height"][i] = np.nan if mean is None else mean
+            column["wave_spread"][i] = np.nan if spread is None else spread
+        curved = np.array([stroke.axes is None for stroke in strokes])
+        if not curved.any() or self.sight.reference is None:
+            return
+        for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
+            column[name][curved] = np.nan
+        feet = [(s.footing.place, s.footing.length) if s.footing else (None, None) for s in strokes]
+        charted = np.array(
+            [
+                bool(c) and p is not None and not self.sight.reference.closed
+                for c, (p, _) in zip(curved, feet, strict=True)
+            ]
+        )
+        if not charted.any():
+            return
+        place = np.stack([p.T for p, _ in _picked(feet, charted)], axis=1)
+        lengths = np.array([length for _, length in _picked(feet, charted)])
+        self._compare(column, charted, place, lengths / self.sight.reference.length)
+
+    def _stroke(self, i: int) -> ReportedStroke:
+        """Return one of the strokes as it is drawn."""
+        row, position = int(self.rows[i]), self.position[:, i].T.copy()
+        n = len(self.t)
+        columns = self.piece.columns
+        at = slice(int(self.first[i]), int(self.first[i]) + n)
+        rotation = None
+        if self.piece.has(*schemas.EULER_ANGLES):
+            angles = np.column_stack([columns[c][at] for c in schemas.EULER_ANGLES])
+            rotation = rotations.from_euler(angles)
+        side = None
+        if self.batch.normal is not None and np.isfinite(self.batch.normal[row]).all():
+            side = self.batch.normal[row]
+        elif self.facts.get("normal") is not None:
+            side = np.asarray(self.facts["normal"], dtype=float)
+        elif self.piece.has(*schemas.NORMAL):
+            side = np.array([columns[c][at.start] for c in schemas.NORMAL])
+        elif rotation is not None:
+            side = -rotation[0, :, 2]
+        aims = np.stack([ends[i] for ends in self.aims])
+        heights = self.facts.get("end_heights", (0.0, 0.0))
+        return ReportedStroke(
+            f"{self.label}[{self.batch.ids[row].as_py()}]",
+            schemas.TRAJECTORY.name,
+            self.role,
+            self.t,
+            position,
+            position,
+            self.start[i],
+            self.goal[i],
+            self.axes[i] if self.known[i] else None,
+            bool(self.closed[i]),
+            self.intended,
+            bool(self.facts.get("simulated", False)),
+            rotation=rotation,
+            side=side,
+            bound=self.facts.get("model") != "original",
+            lesson=self.sight.drawn.lesson,
+            end_heights=(heights[0], heights[1]),
+            aims=aims if np.isfinite(aims).all() else None,
+            over=self.sight.drawn.over,
+            size=self.sight.drawn.size,
+            turn=self.sight.drawn.turn,
+            mark=tolerance_mark.of_facts(self.facts),
+        )
+
+
+def _picked(values: Sequence[Any], which: Booleans) -> list[Any]:
+    return [value for value, chosen in zip(values, which, strict=True) if chosen]

@@ -1,0 +1,68 @@
+"""How hard the tool of a run pressed: a row of the report and its table."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from rich.table import Table
+
+from dmpcli.arrays import Floats
+from dmpcli.metrics.contact import contact
+from dmpcli.records.record import Record
+from dmpcli.reporting import tables
+from dmpcli.reporting.stroke_measures import Row
+
+THRESHOLD = 0.5
+"""N; less is no contact where a run's file does not say what is."""
+
+_FORCE = ("fx", "fy", "fz")
+
+
+def contact_of(run: Record) -> Row | None:
+    """Force along the normal while a run drew; None where nothing was felt.
+
+    A force coupling has said it itself. Of other runs the normal is the plane's that the file
+    tells, else the direction back along the tool.
+
+    Parameters
+    ----------
+    run : Record
+    """
+    said = run.provenance.facts.get("contact")
+    if isinstance(said, dict):
+        return dict(said)
+    if not run.has(*_FORCE):
+        return None
+    normal = _normals(run)
+    if normal is None:
+        return None
+    force = np.sum(run.stack(_FORCE) * normal, axis=1)
+    drawn = force[(run.columns["phase"] == "stroke") & np.isfinite(force)]
+    return asdict(contact(drawn, THRESHOLD)) if len(drawn) else None
+
+
+def table(rows: Sequence[tuple[str, Row]]) -> Table:
+    """Return the table of the forces; each run with its name."""
+    title = "Force along the normal while drawing, N"
+    made = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    made.add_column("run", overflow="fold")
+    for name in ("mean", "least", "largest", "no contact"):
+        made.add_column(name, justify="right", no_wrap=True)
+    for name, row in rows:
+        forces = (tables.number(row[key], 2) for key in ("mean", "least", "largest"))
+        made.add_row(name, *forces, f"{100.0 * row['absent']:.2f} %")
+    return made
+
+
+def _normals(run: Record) -> Floats | None:
+    """Unit normals on the tool's side, shape (n, 3)."""
+    facts, rotation = run.provenance.facts, run.rotation()
+    known = dict(facts.get("trajectory") or {}).get("normal")
+    if known is None and rotation is None:
+        return None
+    normals = np.empty((len(run.t), 3))
+    normals[:] = known if rotation is None or known is not None else -rotation[:, :, 2]
+    for stroke in facts.get("strokes", ()):
+        if stroke.get("normal") is not None and "id" in run.columns:
+            normals[run.columns["id"] == stroke["id"]] = stroke["normal"]
+    return normals

@@ -1,0 +1,191 @@
+"""Strip charts of a mesh: a grid of nodes walked along and across the geodesic, and a spline.
+
+Per pair the centre line is walked from the start, both ways as far as the stroke swings, and from
+each of its nodes the geodesics at a right angle. Between the nodes position and e_v are bicubic;
+one closest-point query per sample puts the result onto the mesh.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.spatial.vectors import across, dot, length
+from dmpcli.surfaces import geodesic_stepping
+from dmpcli.surfaces.strip_grid import Centre, Grid, Nodes, corners, walk_nodes
+from dmpcli.surfaces.surface import Status
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
+
+# Steps across the centre line are no longer than this, mm.
+STEP = 6.5
+# A strip is at least this wide, so that straight strokes have one too, mm.
+LEAST_WIDTH = 1.0
+# Where neighbouring cross lines come nearer than this part of their distance at the centre line,
+# the chart folds or is about to.
+LEAST_STRETCH = 0.1
+# Pairs in hand at once: their nodes fit the processor's cache.
+PAIRS_AT_ONCE = 64
+SAMPLES_AT_ONCE = 4096
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Chart coordinates carried to the mesh, for B pairs.
+
+    Attributes
+    ----------
+    foot, across, normal : array, shape (B, T, 3)
+        On the mesh, mm; e_v and n.
+    face : array of int, shape (B, T)
+    stretch : array, shape (B, T)
+        Distance of neighbouring cross lines, by that at the centre line.
+    outside : array of bool, shape (B, T)
+    status : array of int, shape (B,)
+    sharp : array of bool, shape (B,)
+        Pairs that must be unfolded; the rest of their row means nothing.
+    slivers : array of bool, shape (B,)
+        Pairs that are better unfolded: over slivers, and nowhere near a corner with a defect.
+    """
+
+    foot: Floats
+    across: Floats
+    normal: Floats
+    face: Integers
+    stretch: Floats
+    outside: Booleans
+    status: Integers
+    sharp: Booleans
+    slivers: Booleans
+
+
+def lift(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Samples:
+    """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together."""
+    B, T = u.shape
+    foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
+    face, stretch = np.empty((B, T), dtype=np.int64), np.empty((B, T))
+    outside = np.empty((B, T), dtype=bool)
+    status, sharp, slivers = np.empty(B, dtype=np.int64), *np.empty((2, B), dtype=bool)
+    width = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
+    cross_step = width / np.ceil(width / STEP - 1e-6)
+    shapes = _grids(u / centre.step, v / cross_step)
+    kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
+    for number, shape in enumerate(kinds):
+        members = np.flatnonzero(kind.reshape(-1) == number)
+        for first in range(0, len(members), PAIRS_AT_ONCE):
+            rows = members[first : first + PAIRS_AT_ONCE]
+            part = _lift_alike(
+                mesh, centre.rows(rows), Grid(*shape.tolist()), cross_step[rows], u[rows], v[rows]
+            )
+            foot[rows], e_v[rows], normal[rows] = part.foot, part.across, part.normal
+            outside[rows], status[rows], sharp[rows] = part.outside, part.status, part.sharp
+            slivers[rows], face[rows], stretch[rows] = part.slivers, part.face, part.stretch
+    return Samples(foot, e_v, normal, face, stretch, outside, status, sharp, slivers)
+
+
+def _grids(u: Floats, v: Floats) -> Integers:
+    """`Grid` of each pair, shape (B, 4), of coordinates (B, T) counted in steps."""
+
+    def nodes(reach: Floats) -> Integers:
+        return np.maximum(0, np.ceil(reach - 1e-6)).astype(np.int64)
+
+    behind, ahead = nodes(-u.min(axis=1)), nodes(u.max(axis=1))
+    # Five nodes carry the differences.
+    ahead = np.maximum(ahead, 4 - behind)
+    right, left = nodes(-v.min(axis=1)), nodes(v.max(axis=1))
+    left = np.where(right + left == 0, 1, left)
+    return np.stack([behind, ahead, right, left], axis=1)
+
+
+def _lift_alike(
+    mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, u: Floats, v: Floats
+) -> Samples:
+    i, r = _cell(u / centre.step + grid.behind, grid.behind + grid.ahead)
+    j, s = _cell(v / cross_step + grid.right, grid.right + grid.left)
+    pair = np.arange(len(u))[:, None]
+    cells = np.zeros((len(u), grid.behind + grid.ahead, grid.right + grid.left), dtype=bool)
+    cells[pair, i, j] = True
+    nodes = walk_nodes(mesh, centre, grid, cross_step, cells)
+    point, e_v = _bicubic(nodes, pair, i, j, r, s)
+    flat = point.reshape(-1, 3)
+    found, face = mesh.search(flat)
+    sign = np.repeat(centre.sign, u.shape[1], axis=0)
+    normal = (sign * mesh.smooth_normals(found, face)).reshape(point.shape)
+    foot = found.reshape(point.shape)
+    elsewhere = mesh.components[face] != np.repeat(centre.part, u.shape[1])
+    beyond = (elsewhere | mesh.beyond_border(flat, found, face)).reshape(u.shape)
+    nearest = pair, i + (r > 0.5), j + (s > 0.5)
+    near = nodes.normal[nearest]
+    back = ~beyond & (dot(normal, near)[..., 0] < 0.0)
+    allowed = np.maximum(
+        mesh.reach[face].reshape(u.shape), geodesic_stepping.LANDING * nodes.away[pair, i, j]
+    )
+    far = ~beyond & (length(point - foot)[..., 0] > allowed)
+    touched = corners(cells)
+    status = np.select(
+        [
+            _any(back) | _any(nodes.back & touched),
+            _any(beyond),
+            _any(far),
+            _any((nodes.stretch < LEAST_STRETCH) & touched),
+        ],
+        [np.int64(s) for s in (Status.OTHER_SIDE, Status.BORDER, Status.LOST, Status.FOLDED)],
+        np.int64(Status.DRAWN),
+    )
+    sharp = _any(nodes.sharp & touched)
+    slivers, stretched = mesh.developable.slivers, mesh.developable.stretched
+    better = _any(slivers[face].reshape(u.shape)) & ~_any(stretched[face].reshape(u.shape))
+    return Samples(
+        foot,
+        across(e_v, normal),
+        normal,
+        face.reshape(u.shape),
+        nodes.stretch[nearest],
+        beyond | far,
+        status,
+        sharp,
+        better,
+    )
+
+
+def _any(marks: Booleans) -> Booleans:
+    """Tell which pairs have a mark, shape (B,)."""
+    return np.asarray(marks.reshape(len(marks), -1).any(axis=1))
+
+
+def _cell(at: Floats, cells: int) -> tuple[Integers, Floats]:
+    """Cell of each position, counted in steps from the first node, and the share within it."""
+    i = np.clip(np.floor(at).astype(np.int64), 0, cells - 1)
+    return i, at - i
+
+
+def _hermite(s: Floats) -> tuple[Floats, Floats]:
+    """Weights (..., 4) of value and slope at 0 and at 1, and their derivatives in s."""
+    s2, s3 = s * s, s * s * s
+    value = np.stack([1 - 3 * s2 + 2 * s3, s - 2 * s2 + s3, 3 * s2 - 2 * s3, s3 - s2], axis=-1)
+    slope = np.stack([6 * (s2 - s), 1 - 4 * s + 3 * s2, 6 * (s - s2), 3 * s2 - 2 * s], axis=-1)
+    return value, slope
+
+
+def _bicubic(
+    nodes: Nodes, pair: Integers, i: Integers, j: Integers, r: Floats, s: Floats
+) -> tuple[Floats, Floats]:
+    """Positions and unnormalised e_v, both (B, T, 3), of cells i, j and shares r, s, all (B, T)."""
+    nu, nv = nodes.values.shape[1:3]
+    at = ((pair * nu + i) * nv + j).reshape(-1)
+    # Two nodes of one centre node's cross line stand beside each other: 24 numbers in one piece,
+    # two times (position, v-slope, and the u-slopes of both).
+    table = np.lib.stride_tricks.sliding_window_view(nodes.values.reshape(-1), 24)[::12]
+    r, s = r.reshape(-1), s.reshape(-1)
+    both = np.empty((len(at), 2, 3))
+    for first in range(0, len(at), SAMPLES_AT_ONCE):
+        part = slice(first, first + SAMPLES_AT_ONCE)
+        w, _ = _hermite(r[part])
+        near = table[at[part]].reshape(-1, 2, 2, 6)
+        far = table[at[part] + nv].reshape(-1, 2, 2, 6)
+        near *= w[:, :2].reshape(-1, 1, 2, 1)
+        far *= w[:, 2:].reshape(-1, 1, 2, 1)
+        near += far
+        line = near[:, :, 0] + near[:, :, 1]
+        across_weights = np.stack(_hermite(s[part]), axis=1)
+        np.matmul(across_weights, line.reshape(-1, 4, 3), out=both[part])
+    return both[:, 0].reshape(*i.shape, 3), both[:, 1].reshape(*i.shape, 3)

@@ -1,0 +1,35 @@
+"""Directions that hold nothing but noise, and those that hold a little more."""
+
+import numpy as np
+import pytest
+
+from dmpcli.dmp import noise
+from dmpcli.dmp.flat_directions import moving_axes
+from dmpcli.spatial import rotations
+from tests.dmp.recordings import noisy, six_seconds
+
+Q = rotations.from_euler(np.array([0.7, -0.4, 2.1]))
+
+
+def moving(points):
+    return moving_axes(points - points.mean(axis=0), noise.estimate(points))
+
+
+def test_the_height_of_a_flat_stroke_is_flat_in_any_plane():
+    _, truth = six_seconds()
+    kept = [moving(noisy(truth, 0.1, seed) @ Q.T) for seed in range(30)]
+    assert sum(axes.shape[1] == 2 for axes in kept) >= 29
+    assert np.abs(kept[0].T @ Q[:, 2]).max() < 1e-3
+
+
+@pytest.mark.parametrize(("height", "seconds"), [(0.2, 4.0), (0.5, 0.3), (1.0, 0.05)])
+def test_a_bow_a_hop_and_a_spike_are_not(height, seconds):
+    t, truth = six_seconds()
+    lifted = truth.copy()
+    lifted[:, 2] = height * np.exp(-(((t - 3.0) / (0.5 * seconds)) ** 2))
+    for seed in range(10):
+        assert moving(noisy(lifted, 0.1, seed)).shape == (3, 3)
+
+
+def test_one_direction_is_always_kept():
+    assert moving(noisy(np.zeros((200, 4)), 0.1)).shape == (4, 1)

@@ -1,0 +1,225 @@
+"""What a fit must reach, and the strokes that must not break it."""
+
+import numpy as np
+import pytest
+
+from dmpcli.dmp.learning import fit
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.errors import InputError
+from dmpcli.spatial import rotations
+from tests.dmp.strokes import HEIGHT, circle, paper_stroke
+
+
+def height(reproduction):
+    return np.ptp(reproduction.reproduced[:, 1])
+
+
+def test_default_preset_reproduces_within_the_promised_bounds():
+    lwr = fit([paper_stroke()], FitOptions()).reproductions[0]
+    assert lwr.rms <= 0.05
+    assert lwr.end <= 0.01
+    assert abs(height(lwr) - HEIGHT) <= 0.05
+    ridge = fit([paper_stroke()], FitOptions(regression="ridge")).reproductions[0]
+    assert ridge.rms <= 0.002
+    assert ridge.end <= 0.01
+    assert abs(height(ridge) - HEIGHT) <= 0.005
+
+
+def test_paper_preset_attenuates_as_table_1_and_alpha_f_repairs_it():
+    paper = {"alpha_1": 1.7, "widths": "power", "learning": "paper"}
+    original = fit([paper_stroke()], FitOptions(model="original", **paper)).reproductions[0]
+    modified = fit([paper_stroke()], FitOptions(**paper)).reproductions[0]
+    assert abs(height(original) - 47.669) <= 0.5
+    assert height(modified) >= 49.16
+
+
+def test_in_chart_coordinates_the_goal_lies_on_the_u_axis():
+    skill = fit([paper_stroke()], FitOptions()).skill
+    np.testing.assert_allclose(skill.goal[1:3], 0.0, atol=1e-9)
+    assert skill.goal[0] == pytest.approx(skill.frame.length)
+
+
+def test_fit_does_not_depend_on_where_and_how_the_stroke_lies():
+    here = paper_stroke(turning=True)
+    Q, shift = rotations.from_euler(np.array([0.4, -0.3, 1.1])), np.array([10.0, -900.0, 300.0])
+    there = SmoothedStroke(here.t, here.position @ Q.T + shift, Q @ here.rotation)
+    a, b = fit([here], FitOptions()).skill, fit([there], FitOptions()).skill
+    # Straight-down ties are broken by base axes, so the frames agree up to the motion itself.
+    np.testing.assert_allclose(b.frame.axes, Q @ a.frame.axes, atol=1e-9)
+    np.testing.assert_allclose(b.weights, a.weights, atol=1e-5)
+
+
+def test_a_nearly_zero_component_of_the_original_model_is_fitted_with_factor_1():
+    stroke = paper_stroke()
+    result = fit([stroke], FitOptions(model="original"))
+    assert result.skill.exempt.tolist()[:3] == [False, False, True]
+    assert result.skill.forcing_factor[2] == 1.0
+    assert np.abs(result.skill.weights[2]).max() < 100.0
+    assert result.reproductions[0].rms < 0.2
+
+
+@pytest.mark.parametrize("model", ["modified", "original"])
+@pytest.mark.parametrize("regression", ["lwr", "ridge"])
+def test_a_closed_stroke_fits_without_blow_up(model, regression):
+    result = fit([circle()], FitOptions(model=model, regression=regression))
+    assert result.skill.closed
+    assert result.reproductions[0].rms < 0.1
+    assert np.abs(result.skill.weights).max() < 1e5
+
+
+def test_a_stroke_that_begins_in_motion_keeps_its_initial_velocity():
+    t = np.linspace(0.0, 2.0, 401)
+    position = np.stack([40.0 * t, 10.0 * np.sin(3.0 * t), 0 * t], axis=1)
+    result = fit([SmoothedStroke(t, position)], FitOptions(regression="ridge"))
+    speed = np.linalg.norm(result.skill.initial_velocity[:3]) / result.skill.spring.tau
+    assert speed == pytest.approx(50.0, rel=0.02)
+    assert result.reproductions[0].rms < 0.02
+    without = result.skill.initial_velocity * 0
+    assert not np.allclose(result.skill.initial_velocity, without)
+
+
+def test_a_straight_line_fits_and_has_no_wave():
+    t = np.linspace(0, 5, 251)
+    r = t / 5
+    s = 10 * r**3 - 15 * r**4 + 6 * r**5
+    position = np.array([1.0, 2.0, 3.0]) + np.outer(80 * s, [0.6, 0.0, 0.8])
+    result = fit([SmoothedStroke(t, position)], FitOptions())
+    assert result.reproductions[0].rms < 0.05
+    np.testing.assert_allclose(result.reproductions[0].reproduced[:, 1:], 0.0, atol=1e-9)
+
+
+def test_alpha_f_is_the_closed_form_least_squares_factor():
+    stroke = paper_stroke()
+    choices = FitOptions(alpha_1=1.7, widths="power", learning="paper")
+    result = fit([stroke], choices)
+    skill, signal = result.skill, result.prepared[0].signal
+    r = skill.response(np.linspace(0, skill.duration, len(signal.x)))
+    rest = signal.x - skill.start * r.a - skill.goal * r.b - skill.initial_velocity * r.c
+    for axis in (0, 1):
+        best = np.linalg.lstsq(r.forced[:, axis : axis + 1], rest[:, axis], rcond=None)[0][0]
+        assert skill.alpha_f[axis] == pytest.approx(best, rel=1e-9)
+    assert skill.alpha_f[2] == 1.0  # nothing off the plane, nothing to tell it from
+
+
+def test_idle_ends_are_trimmed_and_a_soft_start_is_kept():
+    moving = paper_stroke()
+    idle = 150
+    position = np.concatenate(
+        [
+            np.repeat(moving.position[:1], idle, axis=0),
+            moving.position,
+            np.repeat(moving.position[-1:], idle, axis=0),
+        ]
+    )
+    t = np.arange(len(position)) * 0.02
+    result = fit([SmoothedStroke(t, position)], FitOptions())
+    before, after = result.prepared[0].trimmed
+    assert 2.4 < before < 3.1
+    assert 2.4 < after < 3.1
+    np.testing.assert_allclose(result.skill.frame.start, moving.position[0], atol=1e-3)
+    untouched = fit([moving], FitOptions()).prepared[0].trimmed
+    assert untouched == (0.0, 0.0)
+
+
+def test_several_demonstrations_of_differing_length_and_duration_share_one_skill():
+    a = paper_stroke()
+    longer = SmoothedStroke(a.t[::2] * 1.4, a.position[::2] * [1.2, 1.0, 1.0])
+    plain = SmoothedStroke(a.t, a.position)
+    result = fit([plain, longer], FitOptions())
+    assert len(result.reproductions) == 2
+    lengths = [p.frame.length for p in result.prepared]
+    assert result.skill.goal[0] == pytest.approx(np.mean(lengths))
+    assert result.skill.duration == pytest.approx(12.0)
+    for r in result.reproductions:
+        assert r.rms < 1.0
+
+
+def test_two_equal_demonstrations_give_the_skill_of_one():
+    one = fit([paper_stroke()], FitOptions()).skill
+    two = fit([paper_stroke(), paper_stroke()], FitOptions()).skill
+    t = np.linspace(0.0, 10.0, 501)
+    # Each takes its initial velocity from a spline of its own: rounding of 1e-9 mm/s and more.
+    responses = [(s, s.response(t)) for s in (one, two)]
+    here, there = (s.initial_velocity * r.c + s.alpha_f * r.forced for s, r in responses)
+    np.testing.assert_allclose(there, here, rtol=0, atol=5e-8)  # mm and rad
+    np.testing.assert_allclose(two.alpha_f, one.alpha_f, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scale", ["axis", "distance"])
+def test_several_demonstrations_of_the_original_model_reproduce_each(scale):
+    a = paper_stroke()
+    result = fit(
+        [a, SmoothedStroke(a.t, a.position + [5.0, 3.0, 0.0], a.rotation)],
+        FitOptions(model="original", forcing_scale=scale),
+    )
+    assert max(r.rms for r in result.reproductions) < 0.2
+
+
+def test_unequal_demonstrations_are_refused_by_what_differs():
+    with pytest.raises(InputError, match=r"demonstration 2 is closed, the first is open"):
+        fit([SmoothedStroke(paper_stroke().t, paper_stroke().position), circle()], FitOptions())
+    bare = SmoothedStroke(paper_stroke().t, paper_stroke().position)
+    with pytest.raises(InputError, match="only one has an orientation"):
+        fit([paper_stroke(), bare], FitOptions())
+
+
+def test_a_tool_that_does_not_move_is_refused():
+    t = np.linspace(0, 1, 50)
+    with pytest.raises(InputError, match="does not move"):
+        fit([SmoothedStroke(t, np.ones((50, 3)))], FitOptions())
+
+
+def test_unevenly_sampled_recordings_give_nearly_the_same_skill():
+    rng = np.random.default_rng(5)
+    t = np.sort(np.concatenate([[0.0, 10.0], rng.uniform(0, 10, 900)]))
+    even = paper_stroke()
+    from scipy.interpolate import CubicSpline
+
+    position = CubicSpline(even.t, even.position)(t)
+    a = fit([SmoothedStroke(even.t, even.position)], FitOptions()).reproductions[0]
+    b = fit([SmoothedStroke(t, position)], FitOptions()).reproductions[0]
+    assert abs(height(a) - height(b)) < 0.01
+
+
+def test_a_turning_tool_is_reproduced_in_its_angles():
+    result = fit([paper_stroke(turning=True)], FitOptions(regression="ridge"))
+    skill, signal = result.skill, result.prepared[0].signal
+    r = skill.response(np.linspace(0, skill.duration, len(signal.x)))
+    x = skill.goal * r.b + skill.initial_velocity * r.c + skill.alpha_f * r.forced
+    assert np.abs(x[:, 3:] - signal.x[:, 3:]).max() < 1e-4
+
+
+def test_the_first_orientation_is_smoothed_too_where_the_recording_begins_before_it():
+    stroke = paper_stroke()
+    idle = 200
+    position = np.concatenate([np.repeat(stroke.position[:1], idle, axis=0), stroke.position])
+    t = np.arange(len(position)) * 0.02
+    errors, raw = [], []
+    for seed in range(8):
+        noise = rotations.exp(0.02 * np.random.default_rng(seed).normal(size=(len(t), 3)))
+        noisy = SmoothedStroke(t, position, noise @ stroke.rotation[0])
+        prepared = fit([noisy], FitOptions()).prepared[0]
+        first = prepared.frame.rotation
+        errors.append(np.linalg.norm(rotations.log(first @ stroke.rotation[0].T)))
+        raw.append(np.linalg.norm(rotations.log(noise[idle])))
+    # Smoothing by noise leaves far less of it than the paper's low-pass: 4 of 25 Hz, 40 %.
+    assert np.mean(errors) < 0.6 * np.mean(raw)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("--normal", {"normal": (0.0, 0.0, 1.0)}),
+        ("--tolerance", {"tolerance": 0.2}),
+        ("--from", {"start": 1.0}),
+        ("--until", {"until": 5.0}),
+        ("--cut-pauses", {"cut_pauses": True}),
+        ("passes", {"passes": 2}),
+        ("--align", {"align": "time"}),
+    ],
+)
+@pytest.mark.parametrize("paper", [{"learning": "paper"}, {"model": "original"}])
+def test_what_the_papers_learning_knows_nothing_of_is_refused(name, asked, paper):
+    with pytest.raises(InputError, match=rf"^{name}: "):
+        fit([paper_stroke()], FitOptions(**asked, **paper))

@@ -1,0 +1,127 @@
+"""How much noise, and of which kind."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmpcli.dmp import noise
+from dmpcli.spatial import rotations
+from tests import human_strokes
+from tests.dmp.recordings import (
+    corners,
+    filtered,
+    interpolated,
+    jerk,
+    letters,
+    noisy,
+    pen_lift,
+    six_seconds,
+    times,
+    wave,
+)
+
+SMOOTH = {"wave": six_seconds, "letters": letters, "corners": corners, "lift": pen_lift}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+def test_white_noise_is_estimated_and_called_white(name, sigma):
+    _, points = SMOOTH[name]()
+    for seed in range(8):
+        found = noise.estimate(noisy(points, sigma, seed))
+        assert found.kind == "white"
+        assert found.typical == pytest.approx(sigma, rel=0.15)
+
+
+def test_half_a_hundred_samples_are_enough():
+    _, points = six_seconds(rate=8.5)
+    found = [noise.estimate(noisy(points, 0.1, seed)).typical for seed in range(30)]
+    assert np.median(found) == pytest.approx(0.1, rel=0.15)
+    assert max(found) <= 0.15
+
+
+def test_noise_of_one_axis_is_found_along_it():
+    _, points = six_seconds()
+    direction = np.array([2.0, -1.0, 2.0]) / 3.0
+    points = points + np.random.default_rng(3).normal(0.0, 0.2, len(points))[:, None] * direction
+    found = noise.estimate(points)
+    assert found.sigma[-1] == pytest.approx(0.2, rel=0.15)
+    assert abs(found.axes[:, -1] @ direction) > 0.99
+    assert np.all(found.sigma[:-1] < 0.01)
+
+
+@given(
+    angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    seed=st.integers(0, 1000),
+    sigma=st.floats(0.01, 1.0),
+)
+@settings(max_examples=20)
+def test_a_rotated_recording_has_the_same_noise(angles, seed, sigma):
+    _, points = six_seconds()
+    points = noisy(points, sigma, seed) * [1.0, 1.0, 0.3]
+    Q = rotations.from_euler(np.array(angles))
+    here, there = noise.estimate(points), noise.estimate(points @ Q.T + [100.0, -500.0, 3.0])
+    assert there.total == pytest.approx(here.total, rel=1e-8)
+    np.testing.assert_allclose(there.sigma, here.sigma, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("seed", range(4))
+def test_filtered_noise_is_recognised_with_where_it_ends(sigma, seed):
+    _, points = six_seconds()
+    found = noise.estimate(filtered(points, sigma, seed))
+    assert found.kind == "band"
+    assert 50.0 * found.reach == pytest.approx(10.0, abs=3.0)
+    assert 0.3 < 50.0 * found.stroke < 4.0
+    assert found.typical == pytest.approx(sigma, rel=0.4)
+
+
+@pytest.mark.parametrize("kind", ["linear", "spline"])
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+def test_noise_that_was_interpolated_is_recognised_with_where_it_ends(kind, sigma):
+    for seed in range(4):
+        _, points = interpolated(lambda t: wave(jerk(t / 6.0)), sigma, kind, seed)
+        found = noise.estimate(points)
+        assert found.kind == "band"
+        assert 50.0 * found.reach == pytest.approx(15.0, abs=4.0)
+
+
+def test_samples_on_a_lattice_are_recognised_with_its_step():
+    _, points = six_seconds()
+    found = noise.estimate(np.round(points / 0.5) * 0.5)
+    assert found.kind == "quantised"
+    assert found.step == pytest.approx(0.5)
+    assert found.typical >= 0.9 * 0.5 / np.sqrt(12.0) * np.sqrt(2 / 3)
+
+
+def test_rounding_in_a_file_is_no_noise():
+    _, points = six_seconds()
+    assert noise.estimate(np.round(points, 3)).kind == "white"
+
+
+def test_errors_of_a_stroke_that_mirrors_itself_are_seen():
+    # Every other coefficient of its rounding errors is zero.
+    _, points = six_seconds()
+    found = noise.estimate(np.round(points / 0.05) * 0.05)
+    assert np.sqrt(found.total) == pytest.approx(0.05 / np.sqrt(12) * np.sqrt(2), rel=0.4)
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_no_kind_of_noise_is_seen_where_there_is_none(name):
+    _, points = SMOOTH[name]()
+    found = noise.estimate(points)
+    assert found.kind == "white"
+    assert found.typical < 0.01
+
+
+def test_no_kind_of_noise_is_seen_in_human_strokes():
+    for shape in human_strokes.shapes():
+        for stroke in human_strokes.strokes(shape)[::3]:
+            assert noise.estimate(stroke.position).kind == "white", shape
+
+
+def test_few_samples_are_not_judged():
+    t = times(1.0, 30.0)
+    found = noise.estimate(noisy(wave(t), 0.3))
+    assert (found.kind, found.total) == ("unknown", 0.0)

@@ -1,0 +1,177 @@
+"""Idle ends, pauses, approach and retract."""
+
+import numpy as np
+import pytest
+
+from dmpcli.dmp import noise, segmentation, smoothing
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.spatial import rotations
+from tests import human_strokes
+from tests.dmp.recordings import (
+    corners,
+    jerk,
+    letters,
+    noisy,
+    pen_lift,
+    six_seconds,
+    wave,
+    with_approach,
+)
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+def segments(t, points, rotation=None):
+    R = None if rotation is None else np.tile(rotation, (len(t), 1, 1))
+    return segmentation.segment(SmoothedStroke(t, points, R), noise.estimate(points))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.02, 0.1, 0.3])
+def test_idle_ends_are_cut_off_whatever_the_noise(sigma):
+    t = np.arange(2000) / 100
+    points = wave(jerk((t - 7.0) / 6.0))
+    for seed in range(10):
+        first, last = segments(t, noisy(points, sigma, seed)).moving
+        assert last - first == pytest.approx(6.0, abs=0.6 if sigma == 0.0 else 0.4)
+        assert (first, last) == (pytest.approx(7.0, abs=0.4), pytest.approx(13.0, abs=0.4))
+
+
+def test_human_strokes_are_trimmed_as_by_their_speed_alone():
+    for shape in human_strokes.shapes()[::6]:
+        for stroke in human_strokes.strokes(shape):
+            found = segmentation.moving_part(stroke, noise.estimate(stroke.position))
+            assert found == smoothing.moving_part(stroke.t, stroke.position), shape
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.01, 0.1, 0.3])
+@pytest.mark.parametrize("rest", [0.6, 1.0, 5.0])
+def test_a_pause_is_found_with_its_times(sigma, rest):
+    _, points = six_seconds()
+    points = np.r_[points[:300], np.tile(points[300], (round(100 * rest), 1)), points[300:]]
+    t = np.arange(len(points)) / 100
+    (pause,) = segments(t, noisy(points, sigma)).pauses
+    assert pause == (pytest.approx(3.0, abs=0.1), pytest.approx(3.0 + rest, abs=0.1))
+
+
+def test_two_pauses_are_told_apart():
+    _, points = six_seconds()
+    rest = np.ones((100, 1))
+    points = np.r_[
+        points[:250], points[250] * rest, points[250:400], points[400] * rest, points[400:]
+    ]
+    found = segments(np.arange(len(points)) / 100, noisy(points, 0.1)).pauses
+    assert [round(begin, 1) for begin, _ in found] == [2.5, 5.0]
+
+
+def test_pauses_that_are_cut_out_leave_no_jump():
+    _, points = six_seconds()
+    still = np.r_[points[:300], np.tile(points[300], (500, 1)), points[300:]]
+    R = rotations.exp(np.column_stack([0.01 * still[:, 0], 0 * still[:, 1:]]))
+    stroke = SmoothedStroke(np.arange(len(still)) / 100, still, R)
+    found = segmentation.segment(stroke, noise.estimate(still))
+    closed = segmentation.cut(stroke, pauses=found.pauses)
+    assert closed.duration == pytest.approx(6.0, abs=0.2)
+    assert len(closed.rotation) == len(closed.t)
+    # No step longer than the stroke's own.
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1).max()
+    assert np.linalg.norm(np.diff(closed.position, axis=0), axis=1).max() <= step + 1e-12
+    assert np.ptp(np.diff(closed.t)) < 1e-12
+
+
+def test_a_cut_keeps_the_samples_that_its_times_name():
+    t, points = six_seconds()
+    part = segmentation.cut(SmoothedStroke(t, points), 1.0, 2.0)
+    assert len(part.t) == 101
+    np.testing.assert_array_equal(part.position, points[100:201])
+    assert part.t[0] == 0.0
+    assert part.t[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize(("down", "up"), [(60, 60), (60, 0), (0, 60), (10, 10), (200, 100)])
+def test_approach_and_retract_are_found_with_their_times(sigma, down, up):
+    _, points = six_seconds()
+    t, joined = with_approach(points, down, up)
+    found = segments(t, noisy(joined, sigma))
+    first = 2.0 if down else 0.0
+    if down:
+        assert found.approach == (0.0, pytest.approx(first, abs=0.4))
+    else:
+        assert found.approach is None
+    if up:
+        assert found.retract == (pytest.approx(first + 6.0, abs=0.4), pytest.approx(t[-1]))
+    else:
+        assert found.retract is None
+
+
+def test_an_approach_may_end_in_a_corner_at_full_speed():
+    t = np.arange(601) / 100
+    main = wave(t / 6.0)
+    q = np.arange(0.0, 1.0, 0.01)[:, None]
+    joined = np.r_[main[0] + (1 - q) * [0, 0, 60.0], main, main[-1] + q[1:] * [0, 0, 60.0]]
+    found = segments(np.arange(len(joined)) / 100, noisy(joined, 0.05))
+    assert found.approach[1] == pytest.approx(1.0, abs=0.1)
+    assert found.retract[0] == pytest.approx(7.0, abs=0.1)
+
+
+def test_the_tool_tells_the_approach_of_a_straight_stroke():
+    s = jerk(np.arange(601) / 600)
+    t, joined = with_approach(np.column_stack([300 * s, 0 * s, 0 * s]), 60, 60)
+    assert segments(t, joined, DOWN).approach is not None
+    assert segments(t, joined).approach is None
+
+
+def strokes_without():
+    t, flat = six_seconds()
+    u = t / 6.0
+    s = jerk(u)
+    yield "wave", t, flat
+    yield "wall", t, flat[:, [0, 2, 1]]
+    yield (
+        "hop",
+        t,
+        flat + 20 * (jerk((u - 0.4) / 0.1) - jerk((u - 0.55) / 0.1))[:, None] * [0, 0, 1],
+    )
+    land = 3 * (1 - jerk(u / 0.1)) + 3 * jerk((u - 0.9) / 0.1)
+    yield "soft landing", t, flat + land[:, None] * [0, 0, 1]
+    small = wave(s, 109, 50) - [54.5, 0, 0]
+    yield "bow", t, small + [0, 0, 600] - np.sqrt(600**2 - small[:, :1] ** 2) * [0, 0, 1]
+    dome = np.sqrt(80**2 - small[:, 0] ** 2 - small[:, 1] ** 2)
+    yield "dome", t, small + dome[:, None] * [0, 0, 1]
+    arch = np.pi * (1 - s)
+    yield "half a pipe", t, np.column_stack([60 * np.cos(arch), small[:, 1], 60 * np.sin(arch)])
+    yield "helix", t, np.column_stack([30 * np.cos(8 * s), 30 * np.sin(8 * s), 60 * s])
+    yield (
+        "seam",
+        t,
+        np.column_stack([300 * s, 0.2 * np.sin(6 * np.pi * s), 1.2 * np.sin(np.pi * s)]),
+    )
+    yield "line", t, np.column_stack([300 * s, 0 * s, 0 * s])
+    for name, V in (
+        ("Z", [[0, 0], [60, 0], [0, 60], [60, 60]]),
+        ("U", [[0, 60], [0, 0], [60, 0], [60, 60]]),
+    ):
+        V = np.column_stack([np.array(V, float), np.zeros(4)])
+        way = np.r_[0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+        yield name, t, np.column_stack([np.interp(way[-1] * s, way, c) for c in V.T])
+    yield "lift", *pen_lift()
+    yield "letters", *letters()
+    yield "corners", *corners()
+
+
+@pytest.mark.parametrize("case", list(strokes_without()), ids=lambda case: case[0])
+def test_no_approach_and_no_pause_where_there_is_none(case):
+    _, t, points = case
+    for sigma in (0.0, 0.05, 0.3):
+        for rotation in (None, DOWN):
+            if rotation is not None and case[0] == "wall":
+                continue
+            found = segments(t, noisy(points, sigma, 1), rotation)
+            assert (found.approach, found.retract, found.pauses) == (None, None, ())
+
+
+def test_human_strokes_have_no_approach_and_no_pause():
+    for shape in human_strokes.shapes()[1::3]:
+        stroke = human_strokes.strokes(shape)[0]
+        found = segments(stroke.t, stroke.position)
+        assert (found.approach, found.retract, found.pauses) == (None, None, ()), shape

@@ -1,0 +1,196 @@
+"""What smoothing by noise must reach, against noise-free strokes in closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.spatial import cKDTree
+
+from dmpcli.dmp import least_squares, noise
+from dmpcli.dmp.spline_smoothing import smooth
+from dmpcli.spatial import rotations
+from tests.dmp.recordings import (
+    corners,
+    filtered,
+    interpolated,
+    jerk,
+    letters,
+    noisy,
+    pen_lift,
+    six_seconds,
+    wave,
+)
+
+SEEDS = range(30)
+
+
+def smoothed(t, points, **options):
+    return smooth(points, float(t[-1]), noise.estimate(points), **options)
+
+
+def errors(spline, t, truth):
+    return np.linalg.norm(spline(t) - truth, axis=1)
+
+
+def peak(acceleration):
+    return np.linalg.norm(acceleration, axis=1).max()
+
+
+@pytest.mark.parametrize(("count", "intervals"), [(60, 3), (500, 40), (5000, 11), (9000, 2000)])
+def test_least_squares_agree_with_scipys(count, intervals):
+    x = np.random.default_rng(0).normal(size=(count, 3))
+    u = np.linspace(0.0, intervals, count)
+    knots = np.pad(np.arange(intervals + 1.0), 5, mode="edge")
+    ours = least_squares.uniform(count, intervals)
+    np.testing.assert_allclose(ours.coefficients(x), make_lsq_spline(u, x, knots, 5).c, atol=1e-9)
+    c = np.random.default_rng(1).normal(size=(intervals + 5, 3))
+    np.testing.assert_allclose(ours.values(c), BSpline(knots, c, 5)(u), atol=1e-11)
+
+
+def test_least_squares_on_unequal_intervals_agree_with_scipys():
+    x = np.random.default_rng(0).normal(size=(200, 3))
+    breaks = np.r_[0.0, 1.0, 1.5, 1.75, 2.0, 3.0, 4.0, 4.5, 5.0]
+    ours = least_squares.Design(200, 0.0, 5.0 / 199, breaks, False)
+    theirs = make_lsq_spline(np.linspace(0.0, 5.0, 200), x, np.pad(breaks, 5, mode="edge"), 5)
+    np.testing.assert_allclose(ours.coefficients(x), theirs.c, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("rate", [8.5, 20.0, 100.0, 300.0])
+def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
+    t, truth = six_seconds(rate)
+    found = [smoothed(t, noisy(truth, sigma, seed)) for seed in SEEDS]
+    off = np.array([errors(spline, t, truth) for spline in found])
+    tree = cKDTree(wave(np.linspace(0.0, 1.0, 10_001)))
+    dense = np.linspace(0.0, 6.0, 500)
+    rms = [np.sqrt(np.mean(tree.query(spline(dense))[0] ** 2)) for spline in found]
+    assert max(rms) <= sigma
+    ends = off[:, [0, -1]].ravel()
+    # Of 52 samples, 13 coefficients on two axes keep 0.7σ: the largest of 48 is thrice that.
+    few = 1.1 if rate < 10.0 else 1.0
+    assert np.quantile(off[:, 2:-2].max(axis=1), 0.9) <= 2.0 * few * sigma
+    assert off.max() <= 4.0 * sigma
+    assert np.median(ends) <= 0.8 * sigma
+    assert np.quantile(ends, 0.9) <= 1.5 * sigma
+    true = peak(smooth(truth, 6.0, noise.estimate(truth))(t, 2))
+    ratios = [peak(spline(t, 2)) / true for spline in found]
+    assert np.quantile(ratios, 0.95) <= 1.5
+
+
+@pytest.mark.parametrize("stroke", [corners, pen_lift])
+@pytest.mark.parametrize("sigma", [0.1, 0.5])
+def test_corners_and_lifts_stay_though_the_rest_is_smooth(stroke, sigma):
+    t, truth = stroke()
+    for seed in range(3):
+        off = errors(smoothed(t, noisy(truth, sigma, seed)), t, truth)
+        # Over three axes: sigma of each.
+        assert np.sqrt(np.mean(off**2) / 3) <= 0.7 * sigma
+        assert off.max() <= 6.0 * sigma
+
+
+@pytest.mark.parametrize("stroke", [six_seconds, letters, corners, pen_lift])
+def test_without_noise_nothing_is_taken_off(stroke):
+    t, truth = stroke()
+    off = errors(smoothed(t, truth), t, truth)
+    assert off.max() <= 0.1
+    assert np.sqrt(np.mean(off**2)) <= 0.01
+
+
+def test_nothing_to_smooth_is_interpolated_and_told_by_no_cutoff():
+    t, truth = six_seconds()
+    spline = smoothed(t, truth)
+    assert spline.cutoff is None
+    assert spline.intervals is None
+    assert spline.removed == 0.0
+    assert errors(spline, t, truth).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_of_a_part_of_the_band_is_smoothed_too(seed):
+    t, truth = six_seconds()
+    true = peak(smooth(truth, 6.0, noise.estimate(truth))(t, 2))
+    for points in (
+        filtered(truth, 0.1, seed),
+        interpolated(lambda t: wave(jerk(t / 6)), 0.1, "linear", seed)[1],
+        interpolated(lambda t: wave(jerk(t / 6)), 0.1, "spline", seed)[1],
+        np.round(truth / 0.5) * 0.5,
+    ):
+        spline = smoothed(t, points)
+        assert peak(spline(t, 2)) <= 1.5 * true
+        assert np.sqrt(np.mean(errors(spline, t, truth) ** 2)) <= 0.1
+
+
+def test_a_slow_stroke_on_a_lattice_is_no_staircase():
+    t = np.arange(3001) / 100
+    truth = wave(jerk(t / 30.0), 100, 20)
+    spline = smoothed(t, np.round(truth / 0.5) * 0.5)
+    true = peak(smooth(truth, 30.0, noise.estimate(truth))(t, 2))
+    assert peak(spline(t, 2)) <= 1.5 * true
+    assert errors(spline, t, truth).max() <= 0.25
+
+
+def test_a_stroke_in_motion_at_its_ends_keeps_its_velocity():
+    t = np.arange(401) / 100
+    truth = wave(t / 4.0, 120, 20)
+    for seed in range(10):
+        spline = smoothed(t, noisy(truth, 0.1, seed))
+        assert spline.rests == (False, False)
+        expected = np.array([30.0, 5 * np.pi, 0.0])
+        assert np.linalg.norm(spline(np.array([0.0, 4.0]), 1) - expected, axis=1).max() < 2.0
+
+
+def test_a_stroke_from_rest_to_rest_begins_and_ends_at_rest():
+    t, truth = six_seconds()
+    spline = smoothed(t, noisy(truth, 0.1))
+    assert spline.rests == (True, True)
+    ends = np.array([0.0, 6.0])
+    assert np.abs(spline(ends, 1)).max() < 1e-9
+    assert np.abs(spline(ends, 2)).max() < 1e-7
+
+
+def test_a_cutoff_that_is_given_decides():
+    t, truth = six_seconds()
+    spline = smoothed(t, noisy(truth, 0.1), cutoff=2.0)
+    assert spline.intervals == 24
+    assert spline.cutoff == pytest.approx(2.0)
+    assert smoothed(t, noisy(truth, 0.1), cutoff=49.0).cutoff is None
+
+
+def test_a_sample_that_flies_off_does_not_spoil_the_rest():
+    t, truth = six_seconds()
+    points = noisy(truth, 0.1)
+    points[300] += [0.0, 3.0, 0.0]
+    off = errors(smoothed(t, points), t, truth)
+    far = np.abs(t - 3.0) > 0.5
+    assert off[far].max() <= 0.2
+
+
+@given(angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3), seed=st.integers(0, 1000))
+@settings(max_examples=15)
+def test_a_recording_moved_and_rotated_is_smoothed_alike(angles, seed):
+    t, truth = six_seconds()
+    points = noisy(truth, 0.2, seed)
+    Q, shift = rotations.from_euler(np.array(angles)), np.array([500.0, -80.0, 1000.0])
+    here, there = smoothed(t, points), smoothed(t, points @ Q.T + shift)
+    np.testing.assert_allclose(there(t), here(t) @ Q.T + shift, atol=1e-9)
+
+
+def test_scaled_and_reversed_recordings_are_smoothed_alike():
+    t, truth = six_seconds()
+    points = noisy(truth, 0.2, 5)
+    here = smoothed(t, points)
+    np.testing.assert_allclose(smoothed(t, 8.0 * points)(t), 8.0 * here(t), atol=1e-9)
+    np.testing.assert_allclose(smoothed(t, points[::-1])(t), here(t)[::-1], atol=1e-9)
+    slow = smoothed(2.0 * t, points)
+    np.testing.assert_allclose(slow(2.0 * t, 1), 0.5 * here(t, 1), atol=1e-9)
+    assert slow.cutoff == pytest.approx(0.5 * here.cutoff)
+
+
+def test_averaged_samples_find_as_good_a_spline():
+    t = np.arange(60_001) / 1000
+    truth = wave(jerk(t / 60.0))
+    spline = smoothed(t, noisy(truth, 0.3))
+    assert errors(spline, t, truth).max() <= 0.1
+    assert spline.intervals < 40

@@ -1,0 +1,118 @@
+"""Demonstrations in their charts: planes, exact surfaces, and what does not lie on them."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.preprocessing import preprocess
+from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.dmp.taught_strokes import mean_frame, taught_strokes
+from dmpcli.errors import InputError, RefusedError
+from dmpcli.surfaces.cylinder import Cylinder
+from dmpcli.surfaces.plane import Plane
+from tests import cases
+from tests.dmp.strokes import circle, paper_stroke
+
+RADIUS = 60.0
+DRUM = Cylinder(np.array([0.0, 0.0, -RADIUS]), np.array([0.0, 1.0, 0.0]), RADIUS)
+UV = cases.wave(cases.U6, 109.0, 40.0)
+
+
+def on_drum(uv, w=0.0):
+    """Points (T, 3) over the cylinder, and the tool's rotations square to it there."""
+    angle, r = uv[:, 0] / RADIUS, RADIUS + w
+    position = np.column_stack([r * np.sin(angle), uv[:, 1], r * np.cos(angle) - RADIUS])
+    down = Rotation.from_euler("x", np.pi)
+    return position, (Rotation.from_euler("y", angle[:, None]) * down).as_matrix()
+
+
+def seen(position, rotation=None, t=cases.T6):
+    return preprocess(SmoothedStroke(t, position, rotation))
+
+
+@pytest.mark.parametrize("w", [0.0, 5.0, -2.0])
+def test_the_chart_of_a_cylinder_is_its_unrolling(w):
+    position, rotation = on_drum(UV, w)
+    [found], plane, closed = taught_strokes([seen(position, rotation)], FitOptions(), DRUM)
+    assert plane is None
+    assert not closed
+    x = found.curve(cases.T6)
+    np.testing.assert_allclose(x[:, :2], UV[:, :2], atol=0.01)
+    np.testing.assert_allclose(x[:, 2], w, atol=0.01)
+    # Square to the surface all along: no turn against the local chart.
+    np.testing.assert_allclose(x[:, 3:], 0.0, atol=1e-3)
+    assert found.length == pytest.approx(109.0, abs=1e-6)
+    # Start and goal are the feet.
+    np.testing.assert_allclose(
+        [found.frame.start, found.frame.goal], on_drum(UV[[0, -1]])[0], atol=1e-6
+    )
+
+
+def test_a_stroke_that_ends_lifted_keeps_its_height_at_the_end():
+    w = 8.0 * cases.jerk((cases.T6 - 4.5) / 1.2)
+    position, _ = on_drum(UV, w)
+    [found], _, _ = taught_strokes([seen(position)], FitOptions(), DRUM)
+    np.testing.assert_allclose(found.curve(cases.T6[[0, -1]])[:, 2], [0.0, 8.0], atol=0.01)
+
+
+def test_the_chart_of_a_named_plane_is_rigid():
+    stroke = paper_stroke(turning=True)
+    Q = Rotation.from_euler("xyz", [0.3, -0.2, 1.0]).as_matrix()
+    plane = Plane(stroke.position[0] + [0, 0, -3.0], np.array([0.0, 0.0, 1.0]))
+    turned = Plane(Q @ plane.point, Q @ plane.normal)
+    moved = SmoothedStroke(stroke.t, stroke.position @ Q.T, Q @ stroke.rotation)
+    [a], _, _ = taught_strokes([preprocess(stroke)], FitOptions(), plane)
+    [b], _, _ = taught_strokes([preprocess(moved)], FitOptions(), turned)
+    t = np.linspace(0.0, 10.0, 50)
+    np.testing.assert_allclose(b.curve(t), a.curve(t), atol=1e-6)
+    # The paper's start and goal lie 0.02 mm apart in height.
+    np.testing.assert_allclose(a.curve(t)[:, 2], 3.0, atol=0.05)
+
+
+def test_coordinates_in_a_plane_are_distances_from_its_line():
+    position = cases.wave(cases.U6) @ cases.about("z", 40.0).T + [5.0, 6.0, 7.0]
+    [found], plane, _ = taught_strokes([seen(position)], FitOptions(), None)
+    assert plane.rule == "fitted"
+    np.testing.assert_allclose(
+        np.abs(found.curve(cases.T6)[:, :3]), np.abs(cases.wave(cases.U6)), atol=1e-6
+    )
+
+
+def test_what_lies_nowhere_near_the_surface_is_refused_with_what_to_check():
+    position, _ = on_drum(UV)
+    with pytest.raises(RefusedError, match=r"mm off the surface; check --surface-pose"):
+        taught_strokes([seen(position + [0.0, 0.0, 500.0])], FitOptions(), DRUM)
+
+
+def test_closedness_is_that_of_the_mean_gap():
+    whole = circle()
+    nearly = SmoothedStroke(whole.t[:-60], whole.position[:-60])
+    open_alone = taught_strokes([preprocess(nearly, trim=False)], FitOptions(), None)[2]
+    both = [preprocess(SmoothedStroke(whole.t, whole.position)), preprocess(nearly, trim=False)]
+    gap = np.linalg.norm(nearly.position[-1] - nearly.position[0])
+    assert gap > 0.0
+    assert taught_strokes(both, FitOptions(), None)[2]
+    assert taught_strokes(both[::-1], FitOptions(), None)[2]
+    assert not open_alone or gap < 6.0
+
+
+def test_a_stroke_without_a_gap_among_open_ones_is_refused():
+    ring, line = circle(), cases.wave(cases.U6, 900.0)
+    both = [preprocess(SmoothedStroke(ring.t, ring.position)), seen(line), seen(line)]
+    with pytest.raises(InputError, match="demonstration 1 is closed, the others are open"):
+        taught_strokes(both, FitOptions(), None)
+
+
+def test_the_mean_frame_lies_between():
+    shift = np.array([10.0, -4.0, 2.0])
+    turn = cases.about("z", 10.0)
+    one = cases.wave(cases.U6)
+    strokes = [seen(one), seen(one @ turn.T + shift)]
+    found, _, closed = taught_strokes(strokes, FitOptions(), None)
+    frame = mean_frame(found, closed)
+    np.testing.assert_allclose(frame.start, shift / 2, atol=1e-9)
+    half = cases.about("z", 5.0)
+    np.testing.assert_allclose(frame.goal - frame.start, half @ [300.0, 0.0, 0.0], atol=1e-6)
+    other = mean_frame(found[::-1], closed)
+    np.testing.assert_allclose(other.axes, frame.axes, atol=1e-12)

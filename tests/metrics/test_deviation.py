@@ -1,0 +1,76 @@
+"""Deviation: geometry worked out by hand, brute force as oracle, rigid invariance."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmpcli.metrics.deviation import Taught, nearest_distance, nearest_rms
+
+
+def brute(point, polyline):
+    best = np.inf
+    for a, b in itertools.pairwise(polyline):
+        length = np.dot(b - a, b - a)
+        share = 0.0 if length == 0 else min(1.0, max(0.0, np.dot(point - a, b - a) / length))
+        best = min(best, np.linalg.norm(point - a - share * (b - a)))
+    return best
+
+
+def test_distances_to_segments_and_beyond_their_ends():
+    polyline = np.array([[0.0, 0, 0], [10, 0, 0], [10, 0, 0], [10, 5, 0]])
+    points = np.array([[4.0, 3, 0], [-3, 4, 0], [10, 5, 2], [12, 2, 0], [0, 0, 0]])
+    assert nearest_distance(points, polyline) == pytest.approx([3, 5, 2, 2, 0], abs=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 30), st.integers(1, 30), st.sampled_from([2, 3]))
+def test_nearest_distance_is_brute_forces(seed, corners, count, d):
+    rng = np.random.default_rng(seed)
+    polyline = 800 + 100 * rng.standard_normal((corners, d))
+    points = 800 + 100 * rng.standard_normal((count, d))
+    points[0] = polyline[0]
+    expected = [brute(p, polyline) for p in points]
+    assert nearest_distance(points, polyline) == pytest.approx(expected, abs=1e-9)
+
+
+def test_long_files_are_done_in_blocks_with_the_same_result():
+    rng = np.random.default_rng(3)
+    polyline = np.cumsum(rng.standard_normal((3000, 3)), axis=0)
+    points = rng.standard_normal((900, 3)) * 30
+    whole = nearest_distance(points, polyline)
+    assert whole[::97] == pytest.approx([brute(p, polyline) for p in points[::97]], abs=1e-9)
+
+
+def test_nearest_rms_of_a_parallel_line_is_the_gap():
+    line = np.column_stack([np.linspace(0, 10, 50), np.zeros(50)])
+    assert nearest_rms(line + np.array([0.0, 0.25]), line) == pytest.approx(0.25, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 7])
+def test_same_shape_late_along_it_deviates_in_phase_but_not_in_shape(count):
+    t = np.linspace(0, 1, 201)
+    line = np.column_stack([100 * t, 0 * t, 0 * t])
+    late = np.column_stack([100 * t**2, 0 * t, 0 * t])
+    strokes = np.repeat(late.T[:, None], count, axis=1)
+    got = Taught(t, line).deviations(5 + 2 * t, strokes, np.ones(count))
+    assert got.nearest_max == pytest.approx(np.zeros(count), abs=1e-9)
+    assert got.phase_max == pytest.approx(np.full(count, 25.0), abs=1e-2)
+    # The integral of (t - t²)² over [0, 1] is 1/30.
+    assert got.phase_rms == pytest.approx(np.full(count, 100 / np.sqrt(30)), rel=1e-2)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.2, 5.0))
+def test_many_strokes_together_are_as_far_as_each_from_every_segment(seed, corners, stretch):
+    rng = np.random.default_rng(seed)
+    taught = np.cumsum(rng.standard_normal((corners, 3)), axis=0)
+    strokes = 3 * rng.standard_normal((6, 15, 3)) + taught.mean(axis=0)
+    factors = np.array([stretch, 1.0, 1.0, stretch, 1.0, 1.0])
+    found = Taught(np.arange(corners), taught).deviations(
+        np.arange(15.0), strokes.transpose(2, 0, 1), factors
+    )
+    for i, (stroke, factor) in enumerate(zip(strokes, factors, strict=True)):
+        far = np.array([brute(p, taught * [factor, 1.0, 1.0]) for p in stroke])
+        assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
+        assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)

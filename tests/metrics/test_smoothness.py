@@ -1,0 +1,95 @@
+"""Smoothness: closed forms of the minimum-jerk reach, invariances, order of what is smoother."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from dmpcli.metrics import motion
+
+
+def log_dimensionless_jerk(t, position, **more):
+    return float(motion.log_dimensionless_jerk(t, position.T[:, None], **more)[0])
+
+
+def spectral_arc_length(t, position, **more):
+    return float(motion.spectral_arc_length(t, position.T[:, None], **more)[0])
+
+
+def reach(n=1001, T=1.0, amplitude=100.0):
+    s = np.linspace(0, 1, n)
+    x = amplitude * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return T * s, np.column_stack([x, 0.5 * x, 0 * x])
+
+
+def test_a_minimum_jerk_reach_has_its_closed_form():
+    # 720 A²/T⁵ of squared jerk over a peak speed of 1.875 A/T.
+    assert log_dimensionless_jerk(*reach()) == pytest.approx(-np.log(720 / 1.875**2), abs=2e-2)
+    finer = log_dimensionless_jerk(*reach(4001), cutoff=None)
+    assert finer == pytest.approx(-np.log(720 / 1.875**2), abs=1e-3)
+
+
+def test_a_sine_has_its_closed_form():
+    t = np.linspace(0, 2.0, 2001)
+    p = 30 * np.sin(2 * np.pi * t)[:, None]
+    # T³/v² ∫j² = T³ w⁶ (T/2) / w²
+    expected = -np.log(2.0**3 * (2 * np.pi) ** 4)
+    assert log_dimensionless_jerk(t, p, cutoff=None) == pytest.approx(expected, abs=2e-3)
+
+
+@pytest.mark.parametrize(("T", "amplitude"), [(3.0, 100.0), (1.0, 0.01), (10.0, 700.0)])
+def test_amplitude_and_duration_do_not_matter(T, amplitude):
+    other = reach(T=T, amplitude=amplitude)
+    assert log_dimensionless_jerk(*other, cutoff=None) == pytest.approx(
+        log_dimensionless_jerk(*reach(), cutoff=None), abs=1e-6
+    )
+    # The padded length, and with it the spectrum's resolution, depends on the samples alone.
+    assert spectral_arc_length(*other, cutoff=10 / T) == pytest.approx(
+        spectral_arc_length(*reach()), abs=1e-3
+    )
+
+
+@pytest.mark.slow
+def test_sparc_of_a_minimum_jerk_reach_is_that_of_its_fourier_transform():
+    def magnitude(f):
+        def speed(s):
+            return 30 * s**2 * (1 - s) ** 2
+
+        re = quad(lambda s: speed(s) * np.cos(2 * np.pi * f * s), 0, 1)[0]
+        im = quad(lambda s: speed(s) * np.sin(2 * np.pi * f * s), 0, 1)[0]
+        return np.hypot(re, im)
+
+    f = np.linspace(0, 10, 2001)
+    M = np.array([magnitude(x) for x in f])
+    last = np.flatnonzero(M >= 0.05)[-1]
+    f, M = f[: last + 1] / f[last], M[: last + 1]
+    expected = -np.sum(np.hypot(np.diff(f), np.diff(M)))
+    assert spectral_arc_length(*reach()) == pytest.approx(expected, abs=0.02)
+
+
+def test_sampling_rate_and_uneven_times_hardly_matter():
+    t, p = reach(n=1001, T=5.0)
+    rng = np.random.default_rng(4)
+    pick = np.sort(np.concatenate([[0, 1000], rng.choice(np.arange(1, 1000), 700, replace=False)]))
+    for measure in (log_dimensionless_jerk, spectral_arc_length):
+        assert measure(t[pick], p[pick]) == pytest.approx(measure(t, p), abs=0.5)
+        assert measure(t[::5], p[::5]) == pytest.approx(measure(t, p), abs=0.1)
+
+
+def test_stick_and_slip_is_less_smooth_than_the_reach_by_both_measures():
+    t, p = reach(n=501, T=10.0)
+    jerky = p + 2.0 * np.round(p / 10.0)
+    for measure in (log_dimensionless_jerk, spectral_arc_length):
+        assert measure(t, jerky) < measure(t, p) - 0.5
+
+
+def test_noise_above_the_cutoff_hardly_counts():
+    t, p = reach(n=5001, T=10.0)
+    noisy = p + 0.05 * np.sin(2 * np.pi * 40 * t)[:, None]
+    assert log_dimensionless_jerk(t, noisy) == pytest.approx(log_dimensionless_jerk(t, p), abs=0.2)
+    assert log_dimensionless_jerk(t, noisy, cutoff=None) < log_dimensionless_jerk(t, p) - 5
+
+
+def test_standing_still_has_no_smoothness():
+    t = np.linspace(0, 1, 100)
+    assert np.isnan(log_dimensionless_jerk(t, np.zeros((100, 3))))
+    assert np.isnan(spectral_arc_length(t, np.zeros((100, 3))))

@@ -1,0 +1,106 @@
+"""Outputs appear whole or not at all; inputs that cannot be read are named."""
+
+import errno
+import os
+import stat
+
+import pytest
+
+from dmpcli.errors import InputError
+from dmpcli.records import file_io
+
+
+def test_write_replaces_whole_and_leaves_no_temporary(tmp_path):
+    target = tmp_path / "a.json"
+    target.write_bytes(b"old")
+    file_io.write(target, b"new")
+    assert target.read_bytes() == b"new"
+    assert os.listdir(tmp_path) == ["a.json"]
+
+
+def test_the_new_name_is_on_the_disk_when_the_write_is_over(tmp_path, monkeypatch):
+    synced = []
+
+    def sync(number):
+        # What is synced, and whether the output has its name by then.
+        synced.append((stat.S_ISDIR(os.fstat(number).st_mode), (tmp_path / "out").exists()))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    file_io.write(tmp_path / "out", b"new")
+    assert synced == [(False, False), (True, True)]
+
+
+def test_a_folder_that_cannot_be_synced_costs_nothing(tmp_path, monkeypatch):
+    def sync(number):
+        if stat.S_ISDIR(os.fstat(number).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", sync)
+    file_io.write(tmp_path / "out", b"new")
+    assert (tmp_path / "out").read_bytes() == b"new"
+
+
+def test_a_failing_write_keeps_the_old_file(tmp_path, monkeypatch):
+    target = tmp_path / "a.json"
+    target.write_bytes(b"old")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match=r"a\.json: cannot be written: No space left"):
+        file_io.write(target, b"new")
+    assert target.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.json"]
+
+
+def test_new_files_have_the_usual_mode(tmp_path):
+    file_io.write(tmp_path / "a", b"x")
+    (tmp_path / "b").write_bytes(b"x")
+    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == stat.S_IMODE(
+        (tmp_path / "b").stat().st_mode
+    )
+
+
+def test_inputs_that_cannot_be_read_are_named(tmp_path):
+    (tmp_path / "empty").touch()
+    for path, message in (
+        (tmp_path, "is a directory"),
+        (tmp_path / "none", "no such file"),
+        (tmp_path / "empty", "is empty"),
+    ):
+        with pytest.raises(InputError, match=message):
+            file_io.read(path)
+
+
+def test_outputs_that_cannot_be_written_are_refused_first(tmp_path):
+    for path, message in (
+        (tmp_path, "is a directory"),
+        (tmp_path / "no" / "a", "does not exist"),
+    ):
+        with pytest.raises(InputError, match=message):
+            file_io.check_writable(path)
+
+
+def test_a_dataset_folder_is_refused_where_a_file_lies(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="is a file"):
+        file_io.check_folder(tmp_path / "file")
+    with pytest.raises(InputError, match="standard output"):
+        file_io.check_folder("-")
+    with pytest.raises(InputError, match="does not exist"):
+        file_io.check_folder(tmp_path / "no" / "batch")
+
+
+def test_a_link_is_followed_and_a_named_pipe_is_written_to(tmp_path):
+    (tmp_path / "real").write_bytes(b"old")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    file_io.write(tmp_path / "link", b"new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"new"
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    file_io.write(tmp_path / "pipe", b"data")
+    assert os.read(reader, 10) == b"data"
+    os.close(reader)
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
