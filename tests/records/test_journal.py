@@ -266,7 +266,8 @@ def test_the_header_holds_no_place_and_no_time(tmp_path):
 
 def test_it_is_written_without_pandas():
     code = (
-        "import sys, pathlib, tempfile; from dmpcli.records import journal, row_buffer, record, schemas;"
+        "import sys, pathlib, tempfile;"
+        "from dmpcli.records import journal, row_buffer, record, schemas;"
         "d = tempfile.TemporaryDirectory(); r = row_buffer.RowBuffer({'t': 1}, ('w',));"
         "j = journal.Journal(pathlib.Path(d.name) / 'j', r, schemas.RUN, record.Provenance('x'));"
         "r.add((1.0,), ('a',)); j.finish({}); j.discard(); print('pandas' in sys.modules)"
