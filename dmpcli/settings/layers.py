@@ -6,7 +6,7 @@ are refused by name. Presets that come with the program are addressed by name.
 """
 
 import tomllib
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -61,14 +61,14 @@ def resolve(
         origin |= dict.fromkeys(values, label)
     given = {key: value for key, value in options.items() if value is not None}
     try:
-        checked: S = _adapter(kind).validate_python(merged | given)
+        checked: S = _adapter(kind).validate_python(merged | given)  # type: ignore[arg-type]
     except ValidationError as error:
         raise InputError(_first(error, kind, given, origin)) from None
     return checked
 
 
 @lru_cache
-def _adapter(kind: Hashable) -> "TypeAdapter[Any]":
+def _adapter(kind: Any) -> "TypeAdapter[Any]":
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)
