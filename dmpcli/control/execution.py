@@ -305,6 +305,7 @@ def record_of(
         "completed": outcome.reason == DONE,
         "missed": loop.timing.missed,
     }
+    facts |= loop.stop_outcome.facts()
     if realtime:
         facts |= loop.timing.facts()
     if loop.pressing is not None and loop.pressing.felt:

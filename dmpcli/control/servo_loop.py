@@ -120,7 +120,7 @@ class PlanLoop(ControlLoop):
     def _enter(self) -> None:
         """Enter servo mode, and make sure that the arm still stands where the plan begins."""
         self._heed()
-        self._arm.servo.start(self._period)
+        self._start()
         # To start may take seconds.
         self._heed()
         check_start(self._arm.servo.state(), self.plan, self._limits)
@@ -146,6 +146,7 @@ class PlanLoop(ControlLoop):
         """Go on until the last plan has ended, or the brake, and the arm stands still."""
         over = self._cursor.finished and (not self._then or self._cursor.braking)
         if over and self._rest.reached(cycle.state):
+            self._rested = True
             self._count()
             return False
         self._advance()

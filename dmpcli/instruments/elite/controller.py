@@ -136,7 +136,8 @@ class Controller:
         mode, detail = self._mode(report, powered or self._settings.servo == "manual")
         # Once, for the check against the joints; later it would be older than they are.
         reported, self._reported = self._reported, None
-        return DriverState(report.t, mode, self._degrees(report), reported, detail)
+        busy = report.state == _PLAY
+        return DriverState(report.t, mode, self._degrees(report), reported, detail, busy)
 
     def fresh_joints(self, patience: float | None = None) -> Floats:
         """Actual joint angles of a frame that comes from now on, degrees.
