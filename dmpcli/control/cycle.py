@@ -20,6 +20,7 @@ from typing import Protocol
 
 from dmpcli.arrays import Floats
 from dmpcli.control import guards, stopping
+from dmpcli.control.arrival import ANGLE, TOLERANCE
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.control.loop_timing import LoopTiming, undisturbed
 from dmpcli.control.settling import SettlingDetector
@@ -51,12 +52,16 @@ class StopLimits:
         Distance of the actual pose from the set-points just sent, mm and rad.
     force, torque : float
         On the tool, N and N·m.
+    arrival, arrival_angle : float
+        Distance of the arm at rest from the set-point that it was led to last, mm and rad.
     """
 
     following_error: float
     following_angle: float
     force: float
     torque: float
+    arrival: float = TOLERANCE
+    arrival_angle: float = ANGLE
 
 
 class WrenchSource(Protocol):
