@@ -118,6 +118,7 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
         execution_plan,
         guards,
         preflight_table,
+        stopping,
         stroke_file,
         workcell,
     )
@@ -178,20 +179,19 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
         outcome = _stream(loop, provenance, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
-    if realtime:
-        tell(str(loop.timing))
-    if loop.pressing is not None:
-        tell(execution.pressed(loop.pressing))
-    stopped = closing or outcome.failure or outcome.signal
-    if stopped and keeper.kept:
-        name = file_io.shown(keeper.output, output=True)
-        tell(f"{name}: {len(loop.log)} rows kept")
-    if closing is not None and outcome.failure is None:
-        raise closing
-    left = (
-        execution_plan.rest_of(batch, loop.drawn) if execution_plan.lifts(batch, settings) else ""
-    )
-    _end(outcome, request, left)
+    with stopping.outranking(lambda: outcome.stop):
+        if realtime:
+            tell(str(loop.timing))
+        if loop.pressing is not None:
+            tell(execution.pressed(loop.pressing))
+        outcome = outcome.unless(closing)
+        if (outcome.failure or outcome.signal) and keeper.kept:
+            name = file_io.shown(keeper.output, output=True)
+            tell(f"{name}: {len(loop.log)} rows kept")
+        left = ""
+        if closing is None and execution_plan.lifts(batch, settings):
+            left = execution_plan.rest_of(batch, loop.drawn)
+        _end(outcome, request, left)
 
 
 def _warn_of(batch: "StrokeSelection", name: str) -> None:
@@ -320,14 +320,14 @@ def _stream(
     loop: "PlanLoop", provenance: "Provenance", realtime: bool, keeper: "RunOutput"
 ) -> "LoopOutcome":
     """Run the loop and write what it logged, whatever ended it."""
-    from dmpcli.control import execution
+    from dmpcli.control import execution, stopping
     from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.signals import Interruption
     from dmpcli.messages import tell
     from dmpcli.records.schemas import RUN
 
     outcome = LoopOutcome("a defect of dmpcli")
-    with Interruption() as interruption:
+    with stopping.outranking(lambda: loop.stop_outcome), Interruption() as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
@@ -336,7 +336,7 @@ def _stream(
         finally:
             if len(loop.log):
                 keeper.keep(
-                    execution.record_of(loop, outcome, provenance, realtime), outcome.failure
+                    execution.record_of(loop, outcome, provenance, realtime), outcome.error()
                 )
             else:
                 keeper.drop()
@@ -347,9 +347,10 @@ def _end(outcome: "LoopOutcome", request: ExecutionRequest, left: str) -> None:
     """Say how the run ended, with the exit code that it earns, and which strokes are left."""
     from dmpcli.messages import tell, warn
 
-    said = outcome.reason + (left and f"; {left}")
-    if outcome.failure is not None:
-        raise type(outcome.failure)(said) if left else outcome.failure
+    left = left and f"; {left}"
+    said, error = outcome.reason + left, outcome.error(after=left)
+    if error is not None:
+        raise error
     if outcome.signal is not None:
         warn(said)
         raise typer.Exit(128 + outcome.signal)

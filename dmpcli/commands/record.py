@@ -41,7 +41,7 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     on_terminal(quiet)
-    from dmpcli.control import keyboard, workcell
+    from dmpcli.control import keyboard, stopping, workcell
     from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.drag_loop import DEFECT, Recorder
     from dmpcli.control.signals import Interruption
@@ -108,21 +108,23 @@ def command(
             warn,
         )
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
-        try:
-            with _status(realtime and wanted()):
-                ending = recorder.run()
-        finally:
-            if len(recorder.log):
-                keeper.keep(_recording(recorder, provenance, ending, realtime), ending.failure)
-            else:
-                keeper.drop()
-    # What was refused before the first row is one line.
-    if len(recorder.log) or ending.failure is None:
-        if realtime:
-            tell(str(recorder.timing))
-        tell(_summary(output, recorder, ending))
-    if ending.failure is not None:
-        raise ending.failure
+        with stopping.outranking(lambda: recorder.stop_outcome):
+            try:
+                with _status(realtime and wanted()):
+                    ending = recorder.run()
+            finally:
+                if len(recorder.log):
+                    keeper.keep(_recording(recorder, provenance, ending, realtime), ending.error())
+                else:
+                    keeper.drop()
+    with stopping.outranking(lambda: ending.stop):
+        # What was refused before the first row is one line.
+        if len(recorder.log) or ending.failure is None:
+            if realtime:
+                tell(str(recorder.timing))
+            tell(_summary(output, recorder, ending))
+        if (error := ending.error()) is not None:
+            raise error
     if signals.number is not None:
         warn(ending.reason)
         raise typer.Exit(128 + signals.number)
@@ -202,6 +204,7 @@ def _recording(
     from dmpcli.records.schemas import DEMONSTRATION
 
     facts = known.facts | {"ended": ending.reason} | (recorder.timing.facts() if realtime else {})
+    facts |= recorder.stop_outcome.facts()
     if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
