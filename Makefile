@@ -113,14 +113,9 @@ soak: $(VENV)/installed
 
 PEERS := $(OUT)/peers
 
-$(PEERS)/installed: benchmarks/peers/requirements.txt
-	$(PYTHON) -m venv $(PEERS)/venv
-	$(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< || \
-	    $(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< \
-	        --extra-index-url https://download.pytorch.org/whl/cpu
-	touch $@
-
-peers: $(PEERS)/installed
+peers:
+	@sh tools/set_up.sh "$(PYTHON)" "$(PEERS)/venv" benchmarks/peers/requirements.txt "$(OUT)" open \
+	    https://download.pytorch.org/whl/cpu
 	$(PEERS)/venv/bin/python -W ignore -m benchmarks.peers > $(PEERS)/peers.md
 	cp $(PEERS)/peers.md docs/peers.md
 	@cat docs/peers.md
