@@ -143,9 +143,8 @@ def _table(folder: Path, source: Source) -> BatchFolder:
             np.asarray(words.indices.fill_null(-1))
         ]
     drawn = np.flatnonzero(part >= 0)
-    bad = next((f for f in files if Path(f).name != f), None)
-    if bad is not None:
-        raise InputError(f"{source.name}: column 'part' names {bad!r}, which is no file of its own")
+    for name in files:
+        file_io.part_in(folder, name, source.name)
 
     def stacked(names: Sequence[str]) -> Floats | None:
         if not all(name in columns for name in names):
@@ -239,7 +238,7 @@ def _compared(batch: BatchFolder) -> list[str]:
             f"{path}: lists {lost[0]}, of which {file_io.TABLE} knows nothing; draw the batch again"
         )
     for entry in found.parts:
-        part = batch.folder / entry.file
+        part = file_io.part_in(batch.folder, entry.file, str(path))
         size = part.stat().st_size if part.is_file() else None
         if size is not None and size != entry.bytes:
             raise InputError(
