@@ -63,7 +63,7 @@ def read(path: str | Path, journal: bool = False) -> Source:
     if str(path) == DASH:
         if sys.stdin is None:
             raise InputError("standard input: is closed; name a file")
-        source = Source(shown(path), sys.stdin.buffer.read())
+        source = Source(shown(path), _limited(shown(path), sys.stdin.buffer, journal))
     else:
         file = Path(path)
         if file.is_dir():
@@ -71,11 +71,9 @@ def read(path: str | Path, journal: bool = False) -> Source:
         try:
             size = file.stat().st_size
             if size > LARGEST and not journal:
-                raise InputError(
-                    f"{path}: has {size / 2**30:.1f} GiB, more than the {LARGEST / 2**30:.0f} GiB "
-                    "that are read at once; cut it in parts, or leave out what is not needed"
-                )
-            source = Source(str(path), file.read_bytes())
+                raise _too_large(str(path), f"{size / 2**30:.1f} GiB")
+            with file.open("rb") as stream:
+                source = Source(str(path), _limited(str(path), stream, journal))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file; check the name") from None
         except OSError as error:
@@ -88,6 +86,23 @@ def read(path: str | Path, journal: bool = False) -> Source:
             f"'dmpcli recover {path} -o FILE'"
         )
     return source
+
+
+def _limited(name: str, stream: BinaryIO, journal: bool) -> bytes:
+    """Read a stream to its end, which not every one has: a device or a pipe may go on for ever."""
+    if journal:
+        return stream.read()
+    content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise _too_large(name, f"over {LARGEST / 2**30:.0f} GiB")
+    return content
+
+
+def _too_large(name: str, size: str) -> InputError:
+    return InputError(
+        f"{name}: has {size}, more than the {LARGEST / 2**30:.0f} GiB that are read at once; cut "
+        "it in parts, or leave out what is not needed"
+    )
 
 
 def shown(path: str | Path, output: bool = False) -> str:

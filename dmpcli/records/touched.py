@@ -10,6 +10,7 @@ from dmpcli.records import tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION
 from dmpcli.records.tables import Table
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 PART = ("px", "py", "pz")
@@ -46,6 +47,7 @@ class Touched:
         return ~np.isnan(self.part[:, 0])
 
 
+@decoder
 def read(source: Source) -> Touched:
     """Read a table with ``x y z`` and, where they are known, ``px py pz`` and ``ax ay az``.
 

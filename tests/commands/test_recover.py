@@ -183,10 +183,9 @@ def test_a_real_run_replaces_no_file_that_appeared_meanwhile(failure, drawn, tmp
         keeper.keep(whole, failure)
     assert out.read_bytes() == b"theirs"
     kept = tmp_path / "run-1.parquet"
-    assert keeper.kept and keeper.output == str(kept)
-    assert (
-        record.decode(file_io.read(kept)).columns["x"].tobytes() == drawn.columns()["x"].tobytes()
-    )
+    assert (keeper.kept, keeper.output) == (True, str(kept))
+    back = record.decode(file_io.read(kept))
+    assert back.columns["x"].tobytes() == drawn.columns()["x"].tobytes()
     assert not (tmp_path / "run.parquet.journal").exists()
 
 
