@@ -86,12 +86,14 @@ class Table:
             The column is missing, or a value is text, empty, NaN or infinite; names the row.
         """
         values = self.floats(column)
-        bad = ~np.isfinite(values)
+        bad = ~(np.abs(values) <= columns.LARGEST)
         if bad.any():
             row = int(np.argmax(bad))
+            finite = bool(np.isfinite(values[row]))
             raise InputError(
                 f"{self.name}: column {column!r}, {self.at(row)}: {self.shown(column, row)} is "
-                "not a finite number; mend or remove the row"
+                + (f"beyond {columns.LARGEST:g}" if finite else "not a finite number")
+                + "; mend or remove the row"
             )
         return values
 
