@@ -141,7 +141,7 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
     clock = MonotonicClock() if realtime else SimulatedClock()
     keeper = None
     if request.output is not None:
-        keeper = RunOutput(request.output, realtime)
+        keeper = RunOutput(request.output, realtime, repeatable or request.force)
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]

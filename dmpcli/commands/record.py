@@ -66,7 +66,7 @@ def command(
     tool_source = file_io.read(tool) if tool else None
     held = tool_file.decode(tool_source) if tool_source else None
     stroke = reference_strokes.build(settings)
-    keeper = RunOutput(output, realtime)
+    keeper = RunOutput(output, realtime, replaces=repeatable or force)
     keeper.check()
     clock = MonotonicClock() if realtime else SimulatedClock()
     bench = workcell.connect(
