@@ -57,14 +57,15 @@ def command(
     for a tilt of 45° all around, or say less with --tilt.
     """
     on_terminal(quiet)
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
 
     if from_file is not None and (by_hand or save is not None):
         raise InputError("--from: reads poses; --by-hand and --save take new ones")
     if "-" in (output, save) and output == save:
         raise InputError("-o - --save -: standard output takes one of them")
-    for name in (output, save):
+    for name, kind in ((output, suffixes.JSON), (save, suffixes.PARQUET)):
         if name is not None:
+            suffixes.check(name, kind)
             file_io.check_writable(name)
     request = CalibrationRequest(
         output,

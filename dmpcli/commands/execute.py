@@ -223,10 +223,11 @@ def _judged(
 
 
 def _check_output(request: ExecutionRequest, repeatable: bool) -> None:
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
 
     if request.output is None:
         return
+    suffixes.check(request.output, suffixes.PARQUET)
     file_io.check_writable(request.output)
     if not repeatable and not request.force and Path(request.output).exists():
         raise InputError(

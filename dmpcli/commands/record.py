@@ -146,8 +146,9 @@ def check_output(output: str, repeatable: bool, force: bool) -> None:
     InputError
         Before anything moves.
     """
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
 
+    suffixes.check(output, suffixes.PARQUET)
     file_io.check_writable(output)
     if not repeatable and not force and output != file_io.DASH and Path(output).exists():
         raise InputError(
