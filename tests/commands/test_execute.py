@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.commands.execute import ExecutionRequest, _check_output
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, record, schemas, tool
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.mock import PEN
+from dmpcli.workflows.execute import ExecutionRequest, check_output
 
 START = np.array([-551.030, 131.399, -17.560])
 FACTS = {"k": [100.0] * 6, "d": [20.0] * 6, "tau": 5.0, "alpha_e": [5.0] * 6}
@@ -476,8 +476,8 @@ def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
     out.write_bytes(b"older")
     request = ExecutionRequest(str(traj), (), str(out), "mock:", None, None, None, *[False] * 4)
     with pytest.raises(InputError, match="--force replaces it"):
-        _check_output(request, repeatable=False)
-    _check_output(dataclasses.replace(request, force=True), repeatable=False)
+        check_output(request, repeatable=False)
+    check_output(dataclasses.replace(request, force=True), repeatable=False)
     assert out.read_bytes() == b"older"
     execute(traj, "-o", out)
     assert len(run_of(out)) > 500
