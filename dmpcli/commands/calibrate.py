@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
-from dmpcli.errors import InputError, RefusedError, counted
+from dmpcli.errors import InputError, RefusedError, UnconfirmedStopError, counted
 from dmpcli.messages import on_terminal
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.settings.options import with_options
@@ -156,6 +156,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         tell(bench.note)
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
+    moving: UnconfirmedStopError | None = None
     options = {"robot": workcell.in_provenance(request.robot), "by_hand": request.by_hand}
     options |= {"sensor": workcell.in_provenance(request.sensor), "realtime": realtime}
     try:
@@ -165,11 +166,20 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     except Interrupted as stop:
         warn(str(stop))
         raise typer.Exit(128 + stop.number) from None
+    except UnconfirmedStopError as error:
+        moving = error
+        raise
     finally:
         # What was measured is kept, whatever ended it.
         closing = guards.leave(bench.robot.close, bench.sensor.close)
         if taken and info is not None:
-            _save(taken, geometry, info, settings, request, source, options)
+            try:
+                _save(taken, geometry, info, settings, request, source, options)
+            except InputError as error:
+                if moving is None:
+                    raise
+                warn(str(error))  # an arm that may still move is told last
+                raise moving from None
     if closing is not None:
         raise closing
     sources = {} if source is None else {"tool": source}

@@ -6,7 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from dmpcli.admittance.force_coupling import Filter
-from dmpcli.control import execution, execution_plan, guards, preflight_table, stroke_file, workcell
+from dmpcli.control import (
+    execution,
+    execution_plan,
+    guards,
+    preflight_table,
+    stopping,
+    stroke_file,
+    workcell,
+)
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.playback import Playback
@@ -183,19 +191,18 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         outcome, made = _stream(loop, provenance, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
-    if realtime:
-        tell(str(loop.timing))
-    if loop.pressing is not None:
-        tell(execution.pressed(loop.pressing))
-    stopped = closing or outcome.failure or outcome.signal
-    if stopped and keeper.kept:
-        tell(f"{_output(keeper.output)}: {len(loop.log)} rows kept")
-    if closing is not None and outcome.failure is None:
-        raise closing
-    left = (
-        execution_plan.rest_of(batch, loop.drawn) if execution_plan.lifts(batch, settings) else ""
-    )
-    return Execution(judged, _finished(outcome, made, request, left))
+    with stopping.outranking(lambda: outcome.stop):
+        if realtime:
+            tell(str(loop.timing))
+        if loop.pressing is not None:
+            tell(execution.pressed(loop.pressing))
+        outcome = outcome.unless(closing)
+        if (outcome.failure or outcome.signal) and keeper.kept:
+            tell(f"{_output(keeper.output)}: {len(loop.log)} rows kept")
+        left = ""
+        if closing is None and execution_plan.lifts(batch, settings):
+            left = execution_plan.rest_of(batch, loop.drawn)
+        return Execution(judged, _finished(outcome, made, request, left))
 
 
 def _name(trajectory: str | Source) -> str:
@@ -314,7 +321,7 @@ def _stream(
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
-    with interruptible(realtime) as interruption:
+    with stopping.outranking(lambda: loop.stop_outcome), interruptible(realtime) as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
@@ -323,7 +330,7 @@ def _stream(
         finally:
             if len(loop.log):
                 made = execution.record_of(loop, outcome, provenance, realtime)
-                keeper.keep(made, outcome.failure)
+                keeper.keep(made, outcome.error())
             else:
                 keeper.drop()
     return outcome, made
@@ -333,9 +340,10 @@ def _finished(
     outcome: LoopOutcome, made: Record | None, request: ExecutionRequest, left: str
 ) -> FinishedRun:
     """Say how the run ended, and which strokes are left; a failure is raised."""
-    said = outcome.reason + (left and f"; {left}")
-    if outcome.failure is not None:
-        raise type(outcome.failure)(said) if left else outcome.failure
+    left = left and f"; {left}"
+    said, error = outcome.reason + left, outcome.error(after=left)
+    if error is not None:
+        raise error
     if outcome.signal is not None:
         warn(said)
     else:
