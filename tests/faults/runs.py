@@ -138,7 +138,9 @@ def run(seed: int, kinds: list[str] | None = None, command: str | None = None) -
         for kind in chosen:
             KINDS[kind](bench, rng, wrong, stack)
         stack.enter_context(bench.laid_out())
-        stack.enter_context(mock.patch("dmpcli.control.watchdog.watched", lambda servo: servo))
+        for module in ("execute", "record"):  # its thread knows the machine's clock alone
+            watched = f"dmpcli.workflows.{module}.watched"
+            stack.enter_context(mock.patch(watched, lambda servo: servo))
         stack.enter_context(_signals(bench))
         result = CliRunner().invoke(app, _words(command, stroke, output))
         rest = _at_rest(bench)
