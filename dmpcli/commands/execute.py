@@ -63,6 +63,13 @@ def command(
     given: Given,
     realtime: Realtime = False,
     allow_mixed: AllowMixed = False,
+    allow_file_mode: Annotated[
+        bool,
+        typer.Option(
+            "--allow-file-mode",
+            help="Let the controller play the plan, though the arm draws on if the link is lost.",
+        ),
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -90,6 +97,7 @@ def command(
             presses=coupling is not None,
             realtime=realtime,
             allow_mixed=allow_mixed,
+            allow_file_mode=allow_file_mode,
             force=force,
         ),
     )
@@ -109,6 +117,7 @@ class ExecutionRequest:
     presses: bool
     realtime: bool
     allow_mixed: bool
+    allow_file_mode: bool
     force: bool
 
 
@@ -117,6 +126,7 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
         execution,
         execution_plan,
         guards,
+        ownership,
         preflight_table,
         stopping,
         stroke_file,
@@ -157,11 +167,15 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
         scene=scene,
         tool=held,
     )
+    guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
     if bench.note:
         tell(bench.note)
     robot = watched(bench.robot) if realtime else bench.robot
+    lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
+    lock.take()
     try:
         arm = ReadyArm(robot, robot.open(), clock)
+        lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
             warn(late)
@@ -178,7 +192,7 @@ def _execute(settings: "ExecuteSettings", request: ExecutionRequest) -> None:
         provenance.facts.update(execution.facts_of(arm, coupling, settings))
         outcome = _stream(loop, provenance, realtime, keeper)
     finally:
-        closing = guards.leave(robot.close, bench.sensor.close)
+        closing = guards.leave(robot.close, bench.sensor.close, lock.release)
     with stopping.outranking(lambda: outcome.stop):
         if realtime:
             tell(str(loop.timing))

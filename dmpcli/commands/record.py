@@ -41,7 +41,7 @@ def command(
 ) -> None:
     """Record one stroke that a hand drags the tool along."""
     on_terminal(quiet)
-    from dmpcli.control import keyboard, stopping, workcell
+    from dmpcli.control import keyboard, ownership, stopping, workcell
     from dmpcli.control.cycle import LoopOutcome
     from dmpcli.control.drag_loop import DEFECT, Recorder
     from dmpcli.control.signals import Interruption
@@ -92,7 +92,7 @@ def command(
     tutored = None if bench.lab is None else stroke
     provenance = _provenance(settings, options, bench.simulated, tool_source, tutored)
     # Entered until the file is there: a signal meanwhile must not cost the recording.
-    with Interruption() as signals:
+    with ownership.ArmLock(addresses[0]) as lock, Interruption() as signals:
         recorder = Recorder(
             watched(bench.robot) if realtime else bench.robot,
             bench.sensor,
@@ -106,6 +106,7 @@ def command(
             rehearsed.lead_in,
             keeper.hindrance,
             warn,
+            lock.shared,
         )
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         with stopping.outranking(lambda: recorder.stop_outcome):

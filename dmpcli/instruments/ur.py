@@ -85,6 +85,9 @@ def make(address: Address, clock: Clock) -> "UrDriver":
     return driver
 
 
+make.port = RTDE_PORT  # type: ignore[attr-defined]  # see `registry`
+
+
 class UrDriver:
     """A `ServoDriver` for UR arms.
 
