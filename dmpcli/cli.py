@@ -21,6 +21,7 @@ COMMANDS = {
     "generalize": "Draw a skill at new start and goal points.",
     "execute": "Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once.",  # noqa: E501
     "report": "Compare strokes: wave heights, deviation, smoothness, ends, deadlines.",
+    "export": "Write a motion as other programs read it: tables, bags, polylines, robot programs.",
     "inspect": "Say what a file is: schema, columns, units, ranges, provenance.",
     "recover": "Make the file that a crash kept `record` or `execute` from writing.",
     "register": "Find where a part lies from points touched on it.",

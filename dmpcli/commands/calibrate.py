@@ -58,17 +58,27 @@ def command(
     for a tilt of 45° all around, or say less with --tilt.
     """
     on_terminal(quiet)
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
 
     if from_file is not None and (by_hand or save is not None):
         raise InputError("--from: reads poses; --by-hand and --save take new ones")
     if "-" in (output, save) and output == save:
         raise InputError("-o - --save -: standard output takes one of them")
-    for name in (output, save):
+    for name, kind in ((output, suffixes.JSON), (save, suffixes.PARQUET)):
         if name is not None:
+            suffixes.check(name, kind)
             file_io.check_writable(name)
     request = CalibrationRequest(
-        output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force
+        output,
+        tool,
+        robot,
+        sensor,
+        by_hand,
+        save,
+        realtime,
+        allow_mixed,
+        force,
+        from_file is not None,
     )
     if from_file is None:
         _measure(settings, request)
@@ -89,6 +99,17 @@ class CalibrationRequest:
     realtime: bool
     allow_mixed: bool
     force: bool
+    from_file: bool
+
+    @property
+    def replaces(self) -> bool:
+        """Whether a file that appears meanwhile may be replaced: the same can be made again."""
+        from dmpcli.control import workcell
+
+        if self.from_file or self.force:
+            return True
+        addresses = workcell.check(self.robot, self.sensor, self.allow_mixed)
+        return workcell.repeatable(addresses)
 
 
 def _from_file(settings: "CalibrateSettings", request: CalibrationRequest, name: str) -> None:
@@ -237,9 +258,10 @@ def _save(
     options: dict[str, Any],
 ) -> None:
     from dmpcli.calibration import result
-    from dmpcli.records import file_io, static_poses
+    from dmpcli.records import static_poses
     from dmpcli.records import tool as tool_file
     from dmpcli.records.record import Provenance, input_of
+    from dmpcli.workflows.run_output import write_once
 
     if request.save is None:
         return
@@ -249,7 +271,7 @@ def _save(
     }
     inputs = () if source is None else (input_of("tool", source),)
     provenance = Provenance("calibrate", options | settings.as_options(), inputs, facts)
-    file_io.write(request.save, static_poses.encode(taken, provenance))
+    write_once(request.save, static_poses.encode(taken, provenance), request.replaces)
 
 
 def _conclude(
@@ -266,6 +288,7 @@ def _conclude(
     from dmpcli.messages import tell, wanted
     from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
+    from dmpcli.workflows.run_output import write_once
 
     found, remarks = result.identified(taken, geometry, settings.condition, settings.max_residual)
     calibration = tool_file.calibrated(
@@ -274,9 +297,8 @@ def _conclude(
         options | settings.as_options(),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
     )
-    file_io.write(
-        request.output, tool_file.encode(result.with_payload(geometry, found), calibration)
-    )
+    written = tool_file.encode(result.with_payload(geometry, found), calibration)
+    write_once(request.output, written, request.replaces)
     for remark in remarks:
         tell(remark)
     if wanted():

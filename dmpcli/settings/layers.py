@@ -17,6 +17,11 @@ from dmpcli.settings.model import Settings, number, settings_of
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+LARGEST = 2**18
+"""Bytes of a file of settings; ours have one or two thousand."""
+
+_DEEPEST = 64
+
 UNITS = {"length": "mm", "angle": "rad", "time": "s", "force": "N", "torque": "N·m"}
 
 
@@ -85,18 +90,34 @@ def _preset(name: str, section: str) -> tuple[str, dict[str, Any]]:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise InputError(f"{path}: is larger than {LARGEST} bytes, and no file of settings")
+        return content.decode("utf-8").replace("\r\n", "\n")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the name") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text: {error}") from None
 
 
-def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, Any]]:
+def _parsed(label: str, text: str) -> dict[str, Any]:
+    """Parse TOML; whatever its parser meets is an error of the file."""
+    # A key of n parts takes it n² steps.
+    deep = next((n for n, x in enumerate(text.split("\n"), 1) if x.count(".") > _DEEPEST), None)
+    if deep is not None:
+        raise InputError(f"{label}: line {deep}: has more than {_DEEPEST} points; split the line")
     try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{label}: is not TOML of ours: it is nested too deep") from None
+    # TOMLDecodeError, and what int or datetime say of numbers and dates beyond their bounds.
+    except (ValueError, OverflowError, TypeError, LookupError, AttributeError) as error:
         raise InputError(f"{label}: is not TOML: {error}") from None
+
+
+def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, Any]]:
+    document = _parsed(label, text)
     units = document.get("units", {})
     for quantity, unit in units.items() if isinstance(units, dict) else [("units", units)]:
         if UNITS.get(quantity) != unit:

@@ -3,15 +3,15 @@
 import csv
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from tests.commands.running import invoke
 from tests.reporting.example_files import (
     CURVED_GOAL,
     CURVED_START,
@@ -31,9 +31,7 @@ from tests.reporting.example_files import (
     wave,
 )
 
-
-def dmpcli(*words, stdin=None):
-    return CliRunner().invoke(app, ["report", *map(str, words)], input=stdin)
+dmpcli = partial(invoke, "report")
 
 
 def document(*words, stdin=None):

@@ -9,7 +9,8 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.simulation.mock import PEN
-from tests.control.drag_fakes import FakeSensor, FakeServo, QueueServo, drag_settings
+from tests.control.drag_fakes import FakeServo, QueueServo, drag_settings
+from tests.control.fake_sensors import StreamingSensor
 
 # A sensor in the TCP with nothing on it senses the wrench that moves the tool.
 WEIGHTLESS = replace(PEN, tcp_position=PEN.sensor_position, weight=0.0, zero=np.zeros(6))
@@ -28,7 +29,7 @@ def bench(
     **options,
 ):
     clock = clock or SimulatedClock()
-    sensor, servo = FakeSensor(clock), kind(clock)
+    sensor, servo = StreamingSensor(clock), kind(clock)
     # Pulled from the first sample on, the tool would be taken for another one.
     settings = drag_settings(**{"tool_check": 1000.0} | options)
     recorder = Recorder(servo, sensor, clock, tool, settings, longest, signals, asked_to_end)
@@ -529,7 +530,7 @@ def test_a_robot_without_drag_teaching_cannot_be_dragged_by_its_own():
 def test_a_hindrance_brakes_and_is_what_the_recording_ends_with():
     full = InstrumentError("demo.journal: No space left on device")
     clock = SimulatedClock()
-    sensor, servo = FakeSensor(clock), FakeServo(clock)
+    sensor, servo = StreamingSensor(clock), FakeServo(clock)
     recorder = Recorder(
         servo,
         sensor,
