@@ -30,7 +30,7 @@ def command(
     tool: Annotated[Path | None, typer.Option(metavar="FILE", help="Tool file.")] = None,
     robot_model: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66."),
+        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66, ur5e."),
     ] = None,
     coupling: Annotated[
         Literal["force"] | None,
