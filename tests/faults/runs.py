@@ -1,5 +1,6 @@
 """One run: a command on the bench, with the faults of its seed, and what a judge says of it."""
 
+import os
 import signal
 import tempfile
 import traceback
@@ -157,26 +158,21 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
 
 def _words(command: str, stroke: str, output: Path) -> list[str]:
     made = folder()
-    robot = "elite://127.0.0.1?lookahead=0.1" + ("&mode=file" if command.endswith("file") else "")
+    # Of this process alone: an arm has one owner on a computer, and several processes run seeds.
+    host = f"127.77.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+    robot = f"elite://{host}?lookahead=0.1" + ("&mode=file" if command.endswith("file") else "")
     words = ["-o", str(output), "--robot", robot, "--tool", str(made / "pen.json")]
     felt = ["--sensor", "netft://127.0.0.1"]
     if command == "record":
         return ["record", *words, *felt, "--duration", "1.3"]
     words = ["execute", str(made / f"{stroke}.parquet"), *words]
     if command.endswith("file"):
-        words.append("--allow-file-mode") if "allow_file_mode" in _options() else None
+        words.append("--allow-file-mode")
     if command.endswith("felt"):
         words += felt
     if command.endswith("pressed"):
         words += [*felt, "--coupling", "force", "--force-setpoint", "2"]
     return words
-
-
-@cache
-def _options() -> str:
-    from dmpcli.commands import execute
-
-    return Path(execute.__file__).read_text()
 
 
 @contextmanager
