@@ -51,7 +51,8 @@ def test_a_driver_sees_the_note_in_its_own_line(tmp_path):
 def test_the_package_itself_uses_no_old_path():
     code = (
         "import sys; import dmpcli.control.workcell, dmpcli.instruments.ur; "
-        "import dmpcli.instruments.elite; print([m for m in ('dmpcli.rotations', 'dmpcli.moved') if m in sys.modules])"
+        "import dmpcli.instruments.elite; "
+        "print([m for m in ('dmpcli.rotations', 'dmpcli.moved') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
