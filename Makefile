@@ -4,6 +4,8 @@
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
 #   make test-quick  the quick half of the tests
+#   make lint        ruff, mypy and import-linter
+#   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
 #   make dist        sdist and wheel, checked, and the wheel tried in an environment without extras
 #   make lock        the lock files, from pyproject.toml
@@ -35,7 +37,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak cluster-demo \
+.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers soak cluster-demo \
     samples pictures schemas clean FORCE
 
 help:
@@ -57,6 +59,10 @@ test: $(VENV)/installed lint
 
 test-quick: $(VENV)/installed
 	$(PYTEST) -m "not slow"
+
+coverage: export COVERAGE_FILE := $(CACHE)/coverage
+coverage: $(VENV)/installed
+	$(PYTEST) -m "not slow" --cov=dmpcli --cov-report=term:skip-covered --cov-report=html:$(OUT)/coverage
 
 # The lowest versions that pyproject.toml allows.
 test-lowest:
