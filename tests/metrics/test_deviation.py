@@ -15,7 +15,7 @@ def brute(point, polyline):
     for a, b in itertools.pairwise(polyline):
         length = np.dot(b - a, b - a)
         share = 0.0 if length == 0 else min(1.0, max(0.0, np.dot(point - a, b - a) / length))
-        best = min(best, np.linalg.norm(point - a - share * (b - a)))
+        best = min(best, float(np.linalg.norm(point - a - share * (b - a))))
     return best
 
 
