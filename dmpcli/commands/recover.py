@@ -27,15 +27,17 @@ def command(
 ) -> None:
     """Make the file that a crash kept `record` or `execute` from writing."""
     on_terminal(quiet)
-    from dmpcli.records import file_io, record
+    from dmpcli.records import file_io, record, suffixes
     from dmpcli.records import journal as journals
+    from dmpcli.workflows.run_output import write_once
 
+    suffixes.check(output, suffixes.PARQUET)
     file_io.check_writable(output)
     if output != file_io.DASH and Path(output).is_file() and not force:
         raise InputError(f"{output}: exists; choose another name, or give --force")
     found = journals.read(file_io.read(journal, journal=True))
     whole = _record(found)
-    file_io.write(output, record.encode(whole))
+    write_once(output, record.encode(whole), replaces=force)
     tell(_summary(output, journal, found, whole))
 
 

@@ -113,7 +113,7 @@ def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
         in_part.setdefault(str(parts[rows_of[name]]), []).append(name)
     # Part by part: the strokes that are drawn stay in memory, the rest of a part does not.
     for part, members in in_part.items():
-        source, rows = _grouped(str(folder / part))
+        source, rows = _grouped(str(file_io.part_in(folder, part, pairs.name)))
         entries.append(record.input_of("trajectory", source))
         for name in members:
             if name not in rows:

@@ -6,7 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from dmpcli.admittance.force_coupling import Filter
-from dmpcli.control import execution, execution_plan, guards, preflight_table, stroke_file, workcell
+from dmpcli.control import (
+    execution,
+    execution_plan,
+    guards,
+    preflight_table,
+    stopping,
+    stroke_file,
+    workcell,
+)
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.playback import Playback
@@ -20,7 +28,7 @@ from dmpcli.instruments.protocols import PlanPlayer
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
-from dmpcli.records import file_io, tolerance_mark
+from dmpcli.records import file_io, suffixes, tolerance_mark
 from dmpcli.records import tool as tool_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
@@ -146,7 +154,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     clock = clocks.MonotonicClock() if realtime else clocks.SimulatedClock()
     keeper = None
     if not request.dry_run:
-        keeper = RunOutput(request.output, realtime)
+        keeper = RunOutput(request.output, realtime, repeatable or request.force)
         keeper.check()
     first = batch.found[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
@@ -183,27 +191,26 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         outcome, made = _stream(loop, provenance, realtime, keeper)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close)
-    if realtime:
-        tell(str(loop.timing))
-    if loop.pressing is not None:
-        tell(execution.pressed(loop.pressing))
-    stopped = closing or outcome.failure or outcome.signal
-    if stopped and keeper.kept:
-        tell(f"{_output(request)}: {len(loop.log)} rows kept")
-    if closing is not None and outcome.failure is None:
-        raise closing
-    left = (
-        execution_plan.rest_of(batch, loop.drawn) if execution_plan.lifts(batch, settings) else ""
-    )
-    return Execution(judged, _finished(outcome, made, request, left))
+    with stopping.outranking(lambda: outcome.stop):
+        if realtime:
+            tell(str(loop.timing))
+        if loop.pressing is not None:
+            tell(execution.pressed(loop.pressing))
+        outcome = outcome.unless(closing)
+        if (outcome.failure or outcome.signal) and keeper.kept:
+            tell(f"{_output(keeper.output)}: {len(loop.log)} rows kept")
+        left = ""
+        if closing is None and execution_plan.lifts(batch, settings):
+            left = execution_plan.rest_of(batch, loop.drawn)
+        return Execution(judged, _finished(outcome, made, request, left))
 
 
 def _name(trajectory: str | Source) -> str:
     return trajectory.name if isinstance(trajectory, Source) else file_io.shown(trajectory)
 
 
-def _output(request: ExecutionRequest) -> str:
-    return "run" if request.output is None else file_io.shown(request.output, output=True)
+def _output(name: str | None) -> str:
+    return "run" if name is None else file_io.shown(name, output=True)
 
 
 def _warn_of(batch: StrokeSelection, name: str) -> None:
@@ -238,6 +245,7 @@ def check_output(request: ExecutionRequest, repeatable: bool) -> None:
     if request.dry_run:
         return
     if request.output is not None:
+        suffixes.check(request.output, suffixes.PARQUET)
         file_io.check_writable(request.output)
     why, remedy = "a run cannot be made again", "--force replaces it"
     refuse_replacing(request.output, repeatable, request.force, why, remedy)
@@ -313,7 +321,7 @@ def _stream(
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
-    with interruptible(realtime) as interruption:
+    with stopping.outranking(lambda: loop.stop_outcome), interruptible(realtime) as interruption:
         keeper.begin(loop.log.rows, RUN, provenance)
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
@@ -322,7 +330,7 @@ def _stream(
         finally:
             if len(loop.log):
                 made = execution.record_of(loop, outcome, provenance, realtime)
-                keeper.keep(made, outcome.failure)
+                keeper.keep(made, outcome.error())
             else:
                 keeper.drop()
     return outcome, made
@@ -332,11 +340,12 @@ def _finished(
     outcome: LoopOutcome, made: Record | None, request: ExecutionRequest, left: str
 ) -> FinishedRun:
     """Say how the run ended, and which strokes are left; a failure is raised."""
-    said = outcome.reason + (left and f"; {left}")
-    if outcome.failure is not None:
-        raise type(outcome.failure)(said) if left else outcome.failure
+    left = left and f"; {left}"
+    said, error = outcome.reason + left, outcome.error(after=left)
+    if error is not None:
+        raise error
     if outcome.signal is not None:
         warn(said)
     else:
-        tell(f"{_output(request)}: {said}")
+        tell(f"{_output(request.output)}: {said}")
     return FinishedRun(made, outcome.signal, said)

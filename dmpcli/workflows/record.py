@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dmpcli.control import keyboard, workcell
+from dmpcli.control import keyboard, stopping, workcell
 from dmpcli.control.cycle import LoopOutcome
 from dmpcli.control.drag_loop import DEFECT, Recorder
 from dmpcli.control.watchdog import watched
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
 from dmpcli.messages import status, tell, warn
-from dmpcli.records import file_io
+from dmpcli.records import file_io, suffixes
 from dmpcli.records import tool as tool_file
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
@@ -90,7 +90,7 @@ def record(
     tool_source = None if request.tool is None else file_io.read(request.tool)
     held = None if tool_source is None else tool_file.decode(tool_source)
     stroke = reference_strokes.build(settings)
-    keeper = RunOutput(request.output, realtime)
+    keeper = RunOutput(request.output, realtime, repeatable or request.force)
     keeper.check()
     clock = clocks.MonotonicClock() if realtime else clocks.SimulatedClock()
     bench = workcell.connect(
@@ -132,22 +132,24 @@ def record(
             warn,
         )
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
-        try:
-            with status("recording; Enter ends it") if realtime else nullcontext():
-                outcome = recorder.run()
-        finally:
-            if len(recorder.log):
-                made = _recording(recorder, provenance, outcome, realtime)
-                keeper.keep(made, outcome.failure)
-            else:
-                keeper.drop()
-    # What was refused before the first row is one line.
-    if made is not None or outcome.failure is None:
-        if realtime:
-            tell(str(recorder.timing))
-        tell(_summary(request.output, recorder, outcome))
-    if outcome.failure is not None:
-        raise outcome.failure
+        with stopping.outranking(lambda: recorder.stop_outcome):
+            try:
+                with status("recording; Enter ends it") if realtime else nullcontext():
+                    outcome = recorder.run()
+            finally:
+                if len(recorder.log):
+                    made = _recording(recorder, provenance, outcome, realtime)
+                    keeper.keep(made, outcome.error())
+                else:
+                    keeper.drop()
+    with stopping.outranking(lambda: outcome.stop):
+        # What was refused before the first row is one line.
+        if made is not None or outcome.failure is None:
+            if realtime:
+                tell(str(recorder.timing))
+            tell(_summary(keeper.output, recorder, outcome))
+        if (error := outcome.error()) is not None:
+            raise error
     if signals.number is not None:
         warn(outcome.reason)
     return FinishedRun(made, signals.number, outcome.reason)
@@ -172,6 +174,7 @@ def check_output(output: str | None, repeatable: bool, force: bool) -> None:
         Before anything moves.
     """
     if output is not None:
+        suffixes.check(output, suffixes.PARQUET)
         file_io.check_writable(output)
     refuse_replacing(output, repeatable, force, "a recording cannot be made again")
 
@@ -203,6 +206,7 @@ def _recording(
 ) -> Record:
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     facts = known.facts | {"ended": outcome.reason} | (recorder.timing.facts() if realtime else {})
+    facts |= recorder.stop_outcome.facts()
     if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))

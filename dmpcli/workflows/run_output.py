@@ -100,6 +100,9 @@ class RunOutput:
     output : str or None
         None: the run stays in memory.
     realtime : bool
+    replaces : bool
+        Whether it may take the place of a file that is there by the end: of one that can be made
+        again, or where that was asked for.
 
     Attributes
     ----------
@@ -108,8 +111,8 @@ class RunOutput:
         Whether the output is there.
     """
 
-    def __init__(self, output: str | None, realtime: bool) -> None:
-        self.output, self._realtime = output, realtime
+    def __init__(self, output: str | None, realtime: bool, replaces: bool = True) -> None:
+        self.output, self._realtime, self._replaces = output, realtime, replaces
         self._journal: Journal | None = None
         self.kept = False
 
@@ -171,24 +174,31 @@ class RunOutput:
         Raises
         ------
         InputError
-            The output cannot be written, and nothing else failed.
+            The output cannot be written, or a file of its name has appeared meanwhile, beside
+            which it is kept; and nothing else failed.
         """
-        from dmpcli.records import file_io, record
+        from dmpcli.records import record
 
         if self._journal is not None:
             self._journal.finish(whole.provenance.facts)
         if self.output is None:
             return
         try:
-            file_io.write(self.output, record.encode(whole))
+            name = kept_as(self.output, record.encode(whole), self._replaces)
         except InputError as error:
-            told = InputError(f"{error}{self._where()}")
-            if failure is None:
-                raise told from None
-            warn(str(told))
+            self._told(InputError(f"{error}{self._where()}"), failure)
             return
         self.kept = True
         self.drop()
+        if name != self.output:
+            appeared, self.output = self.output, name
+            self._told(_moved(appeared, name), failure)
+
+    def _told(self, error: InputError, failure: DmpError | None) -> None:
+        """End with an error, or tell it before the one that the command ends with."""
+        if failure is None:
+            raise error from None
+        warn(str(error))
 
     def drop(self) -> None:
         """Remove the journal: the output is there, or there was nothing to keep."""
@@ -202,3 +212,49 @@ class RunOutput:
         return (
             f"\nthe run is kept in {path}: make room, then 'dmpcli recover {path} -o {self.output}'"
         )
+
+
+def kept_as(output: str, content: bytes, replaces: bool) -> str:
+    """Write what cannot be made again; return the name that it has got.
+
+    Parameters
+    ----------
+    output : str
+        What it is to be called; ``-`` is standard output.
+    content : bytes
+    replaces : bool
+        Whether a file of that name may be replaced; else it is kept under a free name.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    from pathlib import Path
+
+    from dmpcli.records import file_io
+
+    if replaces or output == file_io.DASH:
+        file_io.write(output, content)
+        return output
+    found = file_io.write_new(output, content)
+    return output if found in (Path(output), Path(output).resolve()) else str(found)
+
+
+def write_once(output: str, content: bytes, replaces: bool) -> None:
+    """Write what cannot be made again, beside a file of that name that has appeared meanwhile.
+
+    Raises
+    ------
+    InputError
+        It cannot be written; or it was kept under another name, which is told.
+    """
+    name = kept_as(output, content, replaces)
+    if name != output:
+        raise _moved(output, name)
+
+
+def _moved(output: str, name: str) -> InputError:
+    return InputError(
+        f"{output}: appeared meanwhile and is not replaced; what was measured is kept in {name}"
+    )

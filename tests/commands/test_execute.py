@@ -285,11 +285,11 @@ def batch(tmp_path):
     folder.mkdir()
     first, second = columns(name="a"), columns(duration=5.0, name="b")
     both = {k: np.concatenate([first[k], second[k]]) for k in first}
-    written(folder / "part-0.parquet", both, normal=None)
+    written(folder / "part-00000.parquet", both, normal=None)
     pairs = {
         "id": np.array(["a", "b", "c"], dtype=object),
         "duration": np.array([10.0, 5.0, 5.0]),
-        "part": np.array(["part-0.parquet", "part-0.parquet", ""], dtype=object),
+        "part": np.array(["part-00000.parquet", "part-00000.parquet", ""], dtype=object),
         "status": np.array(["ok", "ok", "start is 3 mm off the plane"], dtype=object),
         "nx": np.zeros(3),
         "ny": np.zeros(3),

@@ -351,11 +351,12 @@ def test_a_second_signal_while_the_file_is_written_does_not_lose_it(tmp_path, mo
 
 
 def test_a_defect_keeps_the_recording_and_its_traceback(tmp_path, monkeypatch):
-    read = MockServo.state
+    read, at = MockServo.state, [0.0]
 
     def broken(servo):
         state = read(servo)
-        return 1 / 0 if state.t > 3.0 else state
+        at.append(state.t)
+        return 1 / 0 if at[-1] > 3.0 >= at[-2] else state
 
     monkeypatch.setattr(MockServo, "state", broken)
     out = tmp_path / "demo.parquet"

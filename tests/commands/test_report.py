@@ -183,7 +183,7 @@ def batch(folder, count):
     ids = [f"{i}" for i in range(count + 1)]
     for number, chosen in enumerate((ids[:half], ids[half:count])):
         paths = np.vstack([wave(NEW_START, NEW_GOAL, 20.0 + int(i)) for i in chosen])
-        put(folder, f"part-{number}", trajectory(paths, ids=chosen))
+        put(folder, f"part-{number:05d}", trajectory(paths, ids=chosen))
     columns = {"id": np.array(ids, dtype=object)}
     for suffix, point in (("0", NEW_START), ("g", NEW_GOAL)):
         columns |= {
@@ -191,7 +191,7 @@ def batch(folder, count):
         }
     columns |= {n: np.full(count + 1, float(n == "nz")) for n in ("nx", "ny", "nz")}
     columns["duration"] = np.full(count + 1, 10.0)
-    parts = ["part-0.parquet"] * half + ["part-1.parquet"] * (count - half) + [""]
+    parts = ["part-00000.parquet"] * half + ["part-00001.parquet"] * (count - half) + [""]
     columns["part"] = np.array(parts, dtype=object)
     columns["status"] = np.array(["ok"] * count + ["too steep"], dtype=object)
     put(folder, "pairs", Record(schemas.PAIRS, columns, Provenance("generalize")))

@@ -431,8 +431,9 @@ def test_an_arm_that_cannot_be_left_is_a_failure_with_its_recording(deed):
     recorder, sensor, servo = bench()
     setattr(servo, deed, unreachable)
     ending = recorder.run()
-    assert ending.reason == "fake: does not answer"
-    assert isinstance(ending.failure, InstrumentError)
+    told = {"stop": "THE ARM MAY STILL MOVE: it could not be told to stop: ", "close": ""}
+    assert ending.reason.startswith(f"{told[deed]}fake: does not answer")
+    assert isinstance(ending.error(), InstrumentError)
     assert len(recorder.log) == 101
     assert sensor.closed == 1
 
@@ -449,7 +450,7 @@ def test_the_first_failure_is_the_one_told():
 
 def test_a_defect_is_raised_but_the_arm_is_stopped_and_the_log_kept():
     recorder, sensor, servo = bench()
-    servo.mode = lambda t: "ready" if t < 1.0 else 1 / 0
+    recorder._asked_to_end = lambda: len(recorder.log) == 45 and 1 / 0
     with pytest.raises(ZeroDivisionError):
         recorder.run()
     assert servo.calls[-2:] == ["stop", "close"]

@@ -321,7 +321,7 @@ def test_an_arm_that_cannot_be_stopped_is_a_failure_with_its_rows():
     bench = Bench()
     bench.servo.stop = unreachable
     outcome = bench.run()
-    assert outcome.reason == "fake: does not answer"
+    assert "could not be told to stop: fake: does not answer" in outcome.reason
     assert isinstance(outcome.failure, InstrumentError)
     assert len(bench.rows) > 500
 
