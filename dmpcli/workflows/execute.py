@@ -17,10 +17,8 @@ from dmpcli.control import (
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.playback import Playback
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
 from dmpcli.control.stroke_file import StrokeSelection
-from dmpcli.control.watchdog import watched
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
@@ -29,7 +27,6 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
 from dmpcli.records import file_io, suffixes, tolerance_mark
-from dmpcli.records import tool as tool_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import RUN
@@ -171,7 +168,11 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     )
     if bench.note:
         tell(bench.note)
-    robot = watched(bench.robot) if realtime else bench.robot
+    robot = bench.robot
+    if realtime:
+        from dmpcli.control.watchdog import watched
+
+        robot = watched(robot)
     try:
         arm = ReadyArm(robot, robot.open(), clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
@@ -254,6 +255,8 @@ def check_output(request: ExecutionRequest, repeatable: bool) -> None:
 def _decoded(tool_file: Source | None, weighed: bool = True) -> Tool | None:
     if tool_file is None:
         return None
+    from dmpcli.records import tool as tool_files
+
     return tool_files.decode(tool_file) if weighed else tool_files.geometry(tool_file)
 
 
@@ -275,7 +278,11 @@ def _loop(
         check = None if tool_file is None else settings.tool_check
         touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
     watch = execution.watch(settings)
-    kind = Playback if isinstance(arm.servo, PlanPlayer) else ServoLoop
+    kind: type[PlanLoop] = ServoLoop
+    if isinstance(arm.servo, PlanPlayer):
+        from dmpcli.control.playback import Playback
+
+        kind = Playback
     return kind(plans[0], limits_of(settings), watch, arm, touch, keeper.hindrance, plans[1:])
 
 

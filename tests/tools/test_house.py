@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from dmpcli.errors import InputError
-
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import house  # noqa: E402
@@ -81,5 +79,6 @@ def test_a_run_is_counted_while_it_runs():
     assert 10 < found["modules entered"] < 120
     assert 1 < found["calls on the stack at a set-point"] < 20
     assert sys.getprofile() is None
-    with pytest.raises(InputError):
+    with pytest.raises(SystemExit):
         house.executed("none.parquet")
+    assert sys.getprofile() is None
