@@ -34,7 +34,8 @@ class ExportOptions(Settings):
     orientation: Annotated[
         tuple[float, float, float] | None,
         Option(
-            "Of the tool where the file says none, rad.",
+            "Of the tool, where the file says none.",
+            "rad",
             metavar="RX RY RZ",
             unset="none is made up",
         ),
