@@ -4,6 +4,8 @@
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
 #   make test-quick  the quick half of the tests
+#   make lint        ruff, mypy and import-linter
+#   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
 #   make dist        sdist and wheel, checked, and the wheel tried in an environment without extras
 #   make lock        the lock files, from pyproject.toml
@@ -36,8 +38,8 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers faults soak cluster-demo \
-    samples pictures schemas clean FORCE
+.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers faults \
+    soak cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -62,6 +64,10 @@ test: $(VENV)/installed
 
 test-quick: $(VENV)/installed
 	$(PYTEST) -m "not slow"
+
+coverage: export COVERAGE_FILE := $(CACHE)/coverage
+coverage: $(VENV)/installed
+	$(PYTEST) -m "not slow" --cov=dmpcli --cov-report=term:skip-covered --cov-report=html:$(OUT)/coverage
 
 # The lowest versions that pyproject.toml allows.
 test-lowest:

@@ -139,8 +139,9 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
         for kind in chosen:
             KINDS[kind](bench, rng, wrong, stack)
         stack.enter_context(bench.laid_out())
-        for module in ("execute", "record"):  # its thread knows the machine's clock alone
-            watched = f"dmpcli.workflows.{module}.watched"
+        # Its thread knows the machine's clock alone.
+        for module in ("control.watchdog", "workflows.record"):
+            watched = f"dmpcli.{module}.watched"
             stack.enter_context(mock.patch(watched, lambda servo: servo))
         stack.enter_context(_signals(bench))
         result = CliRunner().invoke(app, _words(command, stroke, output))
