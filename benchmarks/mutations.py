@@ -13,6 +13,7 @@ makes it again::
 
 import argparse
 import contextlib
+import faulthandler
 import io
 import json
 import multiprocessing
@@ -640,6 +641,7 @@ def run(reader: Reader, count: int, seed: int, keep: Path | None = None) -> Find
 
 def _bounded(task: tuple[str, int, int, Path | None]) -> tuple[str, Findings]:
     name, count, seed, keep = task
+    faulthandler.enable()
     reader = readers()[name]
     run(reader, 20, seed + 1)  # what is loaded once is not the inputs'
     with Path("/proc/self/statm").open(encoding="ascii") as statm:

@@ -291,10 +291,13 @@ def _conclude(
 
 
 def _show(found: "Identification") -> None:
+    import io
+
     from rich.console import Console
     from rich.table import Table
 
     from dmpcli.calibration import result
+    from dmpcli.messages import tell
 
     table = Table(box=None, pad_edge=False)
     table.add_column("")
@@ -303,4 +306,6 @@ def _show(found: "Identification") -> None:
     table.add_column("unit")
     for row in result.table(found):
         table.add_row(*row)
-    Console(stderr=True, width=80, highlight=False).print(table)
+    sink = io.StringIO()
+    Console(file=sink, width=80, highlight=False, color_system=None).print(table)
+    tell(sink.getvalue().rstrip("\n"))

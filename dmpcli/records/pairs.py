@@ -1,5 +1,6 @@
 """Start-goal pairs from CSV or Parquet: every row is kept, bad ones with what is wrong."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ GOAL = ("xg", "yg", "zg")
 START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
 OK = "ok"
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
 FARTHEST = 1e6
 """Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""
@@ -139,6 +142,12 @@ def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
         return [str(row + 1) for row in range(len(table))]
     ids = table.texts("id")
+    odd = next((row for row, name in enumerate(ids) if _CONTROL.search(name)), None)
+    if odd is not None:
+        raise InputError(
+            f"{table.name}: column 'id', {table.at(odd)}: {ids[odd]!r} holds a control character; "
+            "rename it"
+        )
     if len(set(ids)) == len(ids):
         return ids
     seen: dict[str, int] = {}

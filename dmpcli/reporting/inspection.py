@@ -11,7 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError, counted
+from dmpcli.errors import InputError, counted, printable
 from dmpcli.records import (
     json_files,
     layouts,
@@ -79,7 +79,8 @@ def inspected(source: Source) -> Row:
 def as_json(found: Row) -> bytes:
     """Return the description as a JSON file."""
     document = {"schema": NAME, "version": VERSION} | {"found": found}
-    return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    return (printable(text) + "\n").encode()
 
 
 def as_text(found: Row, width: int) -> str:
