@@ -24,6 +24,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -145,7 +146,7 @@ def _csv(names: str, separator: str = ",") -> bytes:
     def cell(i: int, j: int, name: str) -> str:
         if name == "id" and names.split()[1] == "x":
             return "ab"[i % 2]
-        return f"{0.02 * i if j == 0 else i % (j + 3) + 0.2 * i * (name[0] in 'xyz'):.6g}"
+        return f"{0.02 * i if j == 0 else 1 + i % (j + 3) + 0.2 * i * (name[0] in 'xyz'):.6g}"
 
     rows = [names.split()]
     rows += [[cell(i, j, name) for j, name in enumerate(rows[0])] for i in range(20)]
@@ -480,9 +481,11 @@ def _shuffle(document: Any, random: Random) -> None:
         if how == 0:
             del document[key]
         elif how == 1 and isinstance(document, dict):
-            document[random.choice(("schema", "version", "x", "", key + "_"))] = document[key]
+            document[random.choice(("schema", "version", "x", "", key + "_"))] = deepcopy(
+                document[key]
+            )
         elif how == 2 and isinstance(document, list):
-            document += document[: random.choice((1, 3, 1000))]
+            document += deepcopy(document[:3]) * random.choice((1, 300))
         else:
             document[key] = random.choice(_VALUES)
         return
@@ -621,6 +624,8 @@ def _where(error: BaseException) -> str:
 def run(reader: Reader, count: int, seed: int, keep: Path | None = None) -> Findings:
     """Read so many mutations in this process; mutation n is the same whatever came before it."""
     found = Findings()
+    for content in reader.seeds:
+        assert tried(reader, content) == ("read", ""), f"{reader.name}: its start is not sound"
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for number in range(count):
         content = mutated(reader, Random(f"{seed} {reader.name} {number}"))

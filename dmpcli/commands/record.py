@@ -9,7 +9,7 @@ from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell, wanted, warn
 from dmpcli.settings.options import Given, with_options
-from dmpcli.settings.record import TUTOR, RecordSettings, check
+from dmpcli.settings.record import ROOM, TUTOR, RecordSettings, check
 
 if TYPE_CHECKING:
     from dmpcli.control.cycle import LoopOutcome
@@ -107,6 +107,8 @@ def command(
             keeper.hindrance,
             warn,
         )
+        if settings.workspace is None:
+            tell(f"stays within {ROOM:g} mm of the start in x, y and z; --workspace says otherwise")
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         try:
             with _status(realtime and wanted()):

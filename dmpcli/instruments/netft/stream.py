@@ -64,6 +64,8 @@ class Stream:
         Hz.
     heard : float
         When the last record that was taken arrived, s; at first, since when it is waited for.
+    frozen : int
+        So many records in a row, alike in all six counts, are a fault; 0 is no matter how many.
 
     Attributes
     ----------
@@ -79,12 +81,15 @@ class Stream:
     family: Family
     rate: float
     heard: float
+    frozen: int = 0
     sequence: Sequence = field(init=False)
     tally: LossCounter = field(default_factory=LossCounter)
     fault: str | None = None
     _newest: float = -math.inf
     _senseless: int = 0
     _dropped: str = ""
+    _counts: bytes = b""
+    _alike: int = 0
 
     def __post_init__(self) -> None:
         """Begin to count: no stream loses more at once than it sends in a second."""
@@ -159,6 +164,8 @@ class Stream:
                 samples.append(Sample(self._newest, rdt_sequence, wrench, not reason, lost, reason))
                 if reason:
                     self.fault = f"sample {rdt_sequence}: {reason}"
+                else:
+                    self._compare(np.asarray(counts).tobytes())
             elif verdict is Verdict.BACKWARD:
                 self.fault = f"record {rdt_sequence}: {verdict.value}"
             elif verdict is Verdict.JUMP:
@@ -169,6 +176,16 @@ class Stream:
             if self.fault is not None:
                 return
             age -= 1.0 / self.rate
+
+    def _compare(self, counts: bytes) -> None:
+        """Make readings that never change a fault: a live sensor's noise changes them."""
+        self._alike = self._alike + 1 if counts == self._counts else 1
+        self._counts = counts
+        if self.frozen and self._alike >= self.frozen:
+            self.fault = (
+                f"{self._alike} readings in a row are alike in all six counts, though their "
+                "numbers go on: the sensor has frozen; check its cable, or give its URL frozen=0"
+            )
 
     def _unhealthy(self, status: int, wrench: Floats) -> str:
         """Say why a reading must not be believed; empty where it may."""
