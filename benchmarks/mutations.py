@@ -487,7 +487,7 @@ def _shuffle(document: Any, random: Random) -> None:
         elif how == 2 and isinstance(document, list):
             document += deepcopy(document[:3]) * random.choice((1, 300))
         else:
-            document[key] = random.choice(_VALUES)
+            document[key] = deepcopy(random.choice(_VALUES))
         return
 
 

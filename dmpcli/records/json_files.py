@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dmpcli.errors import InputError
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.untrusted import LARGEST_JSON, decoder, judge_size
 
@@ -29,13 +30,27 @@ def json_document(source: Source) -> dict[str, Any]:
     """Return the object of a JSON source; InputError where it is not JSON or not an object."""
     judge_size(source.name, len(source.content), LARGEST_JSON, "a JSON file")
     try:
-        document = json.loads(source.content)
+        document = json.loads(source.content, parse_float=_float, parse_int=_int)
+    except InputError as error:
+        raise InputError(f"{source.name}: {error}") from None
     except (ValueError, RecursionError) as error:
         reason = str(error) if isinstance(error, json.JSONDecodeError) else "not text"
         raise InputError(f"{source.name}: is not JSON: {reason}") from None
     if not isinstance(document, dict):
         raise InputError(f"{source.name}: is JSON, but not an object")
     return document
+
+
+def _float(text: str) -> float:
+    value = float(text)
+    if not abs(value) <= LARGEST:
+        raise InputError(f"{text[:40]} is beyond {LARGEST:g}; mend the file")
+    return value
+
+
+def _int(text: str) -> int:
+    _float(text)
+    return int(text)
 
 
 @decoder

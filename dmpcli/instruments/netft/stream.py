@@ -21,6 +21,9 @@ from dmpcli.instruments.protocols import Sample
 SILENCE = 0.1
 """s without a believable record, after which the stream counts as dead."""
 
+ONE_LOST = 2.5
+"""Periods that pass at most where one record is lost."""
+
 MALFORMED = 10
 """So many senseless datagrams in a row are a fault."""
 
@@ -125,7 +128,8 @@ class Stream:
         now : float
             s, on the clock of the letters.
         """
-        if self.fault is not None or now - self.heard <= SILENCE:
+        # One record that the network loses is no silence, however slow the stream.
+        if self.fault is not None or now - self.heard <= max(SILENCE, ONE_LOST / self.rate):
             return
         why = self._dropped or "another client may have taken the stream, or check cable and power"
         self.fault = f"silent for {now - self.heard:.2f} s; {why}"
