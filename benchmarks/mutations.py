@@ -125,7 +125,8 @@ def _columns(schema: schemas.Schema) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for i, (name, column) in enumerate(schema.columns.items()):
         if column.type == "string":
-            found[name] = np.array(["1"] * (n // 2) + ["2"] * (n - n // 2), dtype=object)
+            alike = name == "id" and schema is not schemas.PAIRS
+            found[name] = np.array([str(i // 20 if alike else i) for i in range(n)], dtype=object)
         elif column.type == "int64":
             found[name] = np.arange(1, n + 1)
         else:
@@ -360,7 +361,7 @@ def readers() -> dict[str, Reader]:
             "a.csv",
             (
                 _csv("t x y z rx ry rz"),
-                _csv("time[s] x[mm] y[mm] z[mm]", ";"),
+                _csv("t x[mm] y[mm] z[mm]", ";"),
             ),
         ),
         ("recording tum", lambda s: recordings.read(s, LAYOUTS["tum"]), "a.txt", (_tum(),)),
@@ -385,7 +386,9 @@ def readers() -> dict[str, Reader]:
         ("sensor pages", _pages, "page", (_API,)),
         *((name, mesh.decode, f"a.{name.split()[0]}", seeds) for name, seeds in meshes.items()),
     ]
-    every = tuple(content for _, _, _, seeds in made for content in seeds)
+    # What `inspect` does not take: journals, settings without their name, pages.
+    apart = ("journal", "settings", "sensor pages")
+    every = tuple(content for name, _, _, seeds in made if name not in apart for content in seeds)
     made.append(("inspect", _inspected, "a.bin", every))
     return {name: Reader(name, read, file, seeds) for name, read, file, seeds in made}
 
