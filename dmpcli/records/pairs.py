@@ -9,6 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import tables
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
 from dmpcli.records.untrusted import decoder
@@ -115,7 +116,7 @@ def _column(table: Table, name: str, status: list[str]) -> Floats:
     largest = LARGEST_ANGLE if name.startswith("r") else FARTHEST
     beyond = np.isfinite(values) & (np.abs(values) > largest)
     _mark(table, status, beyond, name, f"is beyond {largest:g}; check its unit")
-    return values
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
 
 
 def _mark(table: Table, status: list[str], bad: Booleans, name: str, what: str) -> None:

@@ -47,7 +47,7 @@ def opened(source: Source | Path, remedy: str, text: Sequence[str] | None = None
     try:
         with untrusted.decoding(name):
             schema = pq.read_schema(_file(source))
-            untrusted.judge_columns(name, len(schema))
+            untrusted.judge_columns(name, len(schema), schema.names)
             if text is None:
                 text = [field.name for field in schema if _is_text(field.type)]
             return pq.ParquetFile(

@@ -1,6 +1,7 @@
 """What a file is: schema, columns, units, ranges, provenance; and what a foreign one could be."""
 
 import json
+import math
 import textwrap
 import tomllib
 from collections.abc import Callable, Sequence
@@ -79,8 +80,17 @@ def inspected(source: Source) -> Row:
 def as_json(found: Row) -> bytes:
     """Return the description as a JSON file."""
     document = {"schema": NAME, "version": VERSION} | {"found": found}
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False)
     return (printable(text) + "\n").encode()
+
+
+def _finite(value: Any) -> Any:
+    """Return a value for JSON, which has no word for what is not finite."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def as_text(found: Row, width: int) -> str:
@@ -329,6 +339,10 @@ def _extent(found: Row) -> str:
     return text
 
 
+LISTED = 500
+"""Columns that the description for people lists; the other form has all."""
+
+
 def _columns(columns: Sequence[Row]) -> Table:
     table = Table(box=None, pad_edge=False)
     for title, justify in (
@@ -340,7 +354,7 @@ def _columns(columns: Sequence[Row]) -> Table:
         ("meaning", "left"),
     ):
         table.add_column(title, justify=justify)  # type: ignore[arg-type]
-    for column in columns:
+    for column in columns[:LISTED]:
         table.add_row(
             column["name"],
             column.get("unit", ""),
@@ -348,6 +362,8 @@ def _columns(columns: Sequence[Row]) -> Table:
             "-" if column["text"] else str(column["missing"]),
             column.get("meaning", ""),
         )
+    if len(columns) > LISTED:
+        table.add_row(f"and {len(columns) - LISTED} more", "", "", "", "", "")
     return table
 
 
