@@ -11,7 +11,7 @@ from click import ClickException
 from typer.core import TyperCommand, TyperGroup
 
 from dmpcli.commands.pose_arguments import joined
-from dmpcli.errors import DmpError, printable
+from dmpcli.errors import DmpError, UnconfirmedStopError, printable
 from dmpcli.messages import prepare_streams, say
 from dmpcli.version import __version__
 
@@ -23,6 +23,7 @@ COMMANDS = {
     "generalize": "Draw a skill at new start and goal points.",
     "execute": "Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once.",  # noqa: E501
     "report": "Compare strokes: wave heights, deviation, smoothness, ends, deadlines.",
+    "export": "Write a motion as other programs read it: tables, bags, polylines, robot programs.",
     "inspect": "Say what a file is: schema, columns, units, ranges, provenance.",
     "recover": "Make the file that a crash kept `record` or `execute` from writing.",
     "register": "Find where a part lies from points touched on it.",
@@ -51,6 +52,15 @@ class LazyCommand(TyperCommand):
         return typer.main.get_command(whole).make_context(info_name, args, parent, **extra)
 
 
+def _show_defect(error: DmpError) -> None:
+    """Show the traceback of a defect before what outranks it: an arm that may still move."""
+    defect = error.__cause__ if isinstance(error, UnconfirmedStopError) else None
+    if isinstance(defect, Exception) and not isinstance(defect, DmpError | typer.Exit):
+        import traceback
+
+        traceback.print_exception(defect)
+
+
 class Group(TyperGroup):
     """Turns a user's mistake into one message and its exit code; a defect keeps its traceback."""
 
@@ -71,6 +81,7 @@ class Group(TyperGroup):
         try:
             return super().invoke(ctx)
         except DmpError as error:
+            _show_defect(error)
             say(f"dmpcli: {error}")
             sys.exit(error.exit_code)
         except ClickException as error:

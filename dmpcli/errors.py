@@ -32,6 +32,13 @@ class InstrumentError(DmpError):
     exit_code = 4
 
 
+class UnconfirmedStopError(InstrumentError):
+    """An arm that may still move (code 4); its text ends with that, and nothing outranks it.
+
+    Its cause, where that is a defect of ours, is shown with its traceback before.
+    """
+
+
 # Control characters but for tab and newline, what turns the direction of writing or ends a line
 # unseen, and halves of characters, as file names that are no text have them.
 _UNPRINTED = re.compile(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
-from dmpcli.errors import InputError, RefusedError, counted
+from dmpcli.errors import InputError, RefusedError, UnconfirmedStopError, counted
 from dmpcli.messages import on_terminal
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.settings.options import with_options
@@ -61,14 +61,15 @@ def command(
     for a tilt of 45° all around, or say less with --tilt.
     """
     on_terminal(quiet)
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
 
     if from_file is not None and (by_hand or save is not None):
         raise InputError("--from: reads poses; --by-hand and --save take new ones")
     if "-" in (output, save) and output == save:
         raise InputError("-o - --save -: standard output takes one of them")
-    for name in (output, save):
+    for name, kind in ((output, suffixes.JSON), (save, suffixes.PARQUET)):
         if name is not None:
+            suffixes.check(name, kind)
             file_io.check_writable(name)
     request = CalibrationRequest(
         output,
@@ -162,6 +163,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
     failed = True
+    moving: UnconfirmedStopError | None = None
     options = {"robot": workcell.in_provenance(request.robot), "by_hand": request.by_hand}
     options |= {"sensor": workcell.in_provenance(request.sensor), "realtime": realtime}
     try:
@@ -172,12 +174,21 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     except Interrupted as stop:
         warn(str(stop))
         raise typer.Exit(128 + stop.number) from None
+    except UnconfirmedStopError as error:
+        moving = error
+        raise
     finally:
         # What was measured is kept, whatever ended it.
         closing = guards.leave(bench.robot.close, bench.sensor.close)
         if taken and info is not None:
-            name = _poses_name(request, failed or closing is not None)
-            _save(taken, geometry, info, settings, request, source, options, name)
+            try:
+                name = _poses_name(request, failed or closing is not None)
+                _save(taken, geometry, info, settings, request, source, options, name)
+            except InputError as error:
+                if moving is None:
+                    raise
+                warn(str(error))  # an arm that may still move is told last
+                raise moving from None
     if closing is not None:
         raise closing
     sources = {} if source is None else {"tool": source}

@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Learn a skill from one or several demonstrations."""
     on_terminal(quiet)
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
     from dmpcli.workflows import surface_input
     from dmpcli.workflows.fit import check_said, learn
     from dmpcli.workflows.fit_messages import summary
@@ -52,6 +52,7 @@ def command(
     check_said(given, surface is not None)
     surface_input.check_options(surface, surface_pose, surface_unit)
     layout = form.as_layout()
+    suffixes.check(output, suffixes.JSON)
     file_io.check_writable(output)
     if [str(path) for path in demonstrations].count(file_io.DASH) > 1:
         raise InputError("-: standard input can be read only once")

@@ -158,13 +158,14 @@ def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
 def _check_destination(
     output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
 ) -> None:
-    from dmpcli.records import file_io, record
+    from dmpcli.records import file_io, record, suffixes
     from dmpcli.records.pairs import FARTHEST
     from dmpcli.workflows.ranges import within
 
     if reproduce:
         if any(given is not None for given in (start, goal, pairs)):
             raise InputError("--reproduce takes the demonstrated ends; leave other ends out")
+        suffixes.check(output, suffixes.PARQUET)
         file_io.check_writable(output)
         return
     if pairs is None:
@@ -174,6 +175,7 @@ def _check_destination(
             )
         within("--start", start, FARTHEST)
         within("--goal", goal, FARTHEST)
+        suffixes.check(output, suffixes.PARQUET)
         file_io.check_writable(output)
         return
     if start is not None or goal is not None:

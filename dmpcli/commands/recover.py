@@ -27,10 +27,11 @@ def command(
 ) -> None:
     """Make the file that a crash kept `record` or `execute` from writing."""
     on_terminal(quiet)
-    from dmpcli.records import file_io, record
+    from dmpcli.records import file_io, record, suffixes
     from dmpcli.records import journal as journals
     from dmpcli.workflows.run_output import write_once
 
+    suffixes.check(output, suffixes.PARQUET)
     file_io.check_writable(output)
     if output != file_io.DASH and Path(output).is_file() and not force:
         raise InputError(f"{output}: exists; choose another name, or give --force")

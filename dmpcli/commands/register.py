@@ -53,7 +53,7 @@ def command(
     from dmpcli.commands import register_checks
     from dmpcli.errors import about
     from dmpcli.messages import tell
-    from dmpcli.records import file_io, mesh, pose
+    from dmpcli.records import file_io, mesh, pose, suffixes
     from dmpcli.records import touched as touched_file
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.mesh import Mesh
@@ -63,6 +63,7 @@ def command(
     guess, unit, max_error = settings.guess, settings.unit, settings.max_error
     if guess == "none" and initial is not None:
         raise InputError("--guess none searches all orientations; leave --initial out")
+    suffixes.check(output, suffixes.JSON)
     file_io.check_writable(output)
     sources = {"part": file_io.read(part), "touched": file_io.read(touched)}
     waiting = mesh.waiting(sources["part"])

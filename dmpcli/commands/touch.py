@@ -51,12 +51,13 @@ def command(
     from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.messages import tell
-    from dmpcli.records import file_io
+    from dmpcli.records import file_io, suffixes
     from dmpcli.records import tool as tool_file
 
     every, count = settings.every, settings.count
     _check(pairs, angles, part, every, count)
     repeatable = workcell.repeatable(workcell.check(robot, None))
+    suffixes.check(output, suffixes.CSV)
     file_io.check_writable(output)
     if output != "-" and not (repeatable or force) and Path(output).exists():
         raise InputError(

@@ -110,9 +110,17 @@ def nulls(values: Any) -> Booleans:
     return unknown
 
 
+def dtype_of(kind: Any) -> np.dtype[Any]:
+    """Return numpy's type for Arrow's type of numbers; to_pandas_dtype may import pandas for it."""
+    letter = (
+        "f" if pa.types.is_floating(kind) else "u" if pa.types.is_unsigned_integer(kind) else "i"
+    )
+    return np.dtype(f"{letter}{kind.bit_width // 8}")
+
+
 def numbers(values: Any) -> AnyArray:
     """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
-    dtype = values.type.to_pandas_dtype()
+    dtype = dtype_of(values.type)
     if len(values) == 0:
         return np.empty(0, dtype=dtype)
     whole = np.frombuffer(values.buffers()[1], dtype=dtype)

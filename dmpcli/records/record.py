@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import parquet, schemas, untrusted
-from dmpcli.records.columns import TYPES, columns_of
+from dmpcli.records.columns import TYPES, columns_of, dtype_of
 from dmpcli.records.file_io import PART, TABLE, Source
 from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
@@ -194,7 +194,7 @@ def _arrow(values: Any, kind: Any) -> Any:
     valid = None
     if values.dtype.kind == "f" and _may_hold_nan(values):
         valid = _validity(~np.isnan(values))
-    data = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    data = np.ascontiguousarray(values, dtype=dtype_of(kind))
     return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)])
 
 

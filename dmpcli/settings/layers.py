@@ -7,6 +7,7 @@ are refused by name. Presets that come with the program are addressed by name.
 
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +16,7 @@ from dmpcli.errors import InputError
 from dmpcli.settings.model import Settings, number, settings_of
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
+    from pydantic import TypeAdapter, ValidationError
 
 LARGEST = 2**18
 """Bytes of a file of settings; ours have one or two thousand."""
@@ -53,7 +54,7 @@ def resolve(
         A file is missing or is not TOML, states other units, lacks the section, names an unknown
         key, or a value is of the wrong type, out of range, NaN or infinite.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     merged: dict[str, Any] = {}
     origin: dict[str, str] = {}
@@ -65,9 +66,17 @@ def resolve(
         origin |= dict.fromkeys(values, label)
     given = {key: value for key, value in options.items() if value is not None}
     try:
-        return TypeAdapter(kind).validate_python(merged | given)
+        checked: S = _adapter(kind).validate_python(merged | given)  # type: ignore[arg-type]
     except ValidationError as error:
         raise InputError(_first(error, kind, given, origin)) from None
+    return checked
+
+
+@lru_cache
+def _adapter(kind: Any) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def preset_names() -> list[str]:

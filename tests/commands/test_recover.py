@@ -192,6 +192,7 @@ def test_a_real_run_replaces_no_file_that_appeared_meanwhile(failure, drawn, tmp
 @pytest.mark.parametrize("force", [False, True])
 def test_record_replaces_what_appeared_only_if_it_may(force, tmp_path, monkeypatch):
     from dmpcli.control import workcell
+    from dmpcli.instruments import clock as clocks
 
     out, begin = tmp_path / "run.parquet", RunOutput.begin
 
@@ -201,6 +202,8 @@ def test_record_replaces_what_appeared_only_if_it_may(force, tmp_path, monkeypat
 
     monkeypatch.setattr(RunOutput, "begin", somebody_is_faster)
     monkeypatch.setattr(workcell, "repeatable", lambda _: False)
+    monkeypatch.setattr(clocks, "MonotonicClock", clocks.SimulatedClock)
+    monkeypatch.setattr("dmpcli.workflows.record.watched", lambda servo: servo)
     words = ["record", "-o", str(out), "--reference", "line", "--duration", "1.5"]
     words += ["--start", "-551", "131", "-17.56", "--goal", "-561", "131", "-17.56"]
     words += ["--force"] if force else []

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from dmpcli.cli import app
 from dmpcli.records import file_io, record
 
-WATCHED = ("commands/record.py", "commands/execute.py", "run_output.py", "control/signals.py")
+WATCHED = ("workflows/record.py", "workflows/execute.py", "run_output.py", "control/signals.py")
 LINE = ["--reference", "line", "--duration", "1.5", "--start", "-551", "131", "-17.56"]
 LINE += ["--goal", "-561", "131", "-17.56"]
 
@@ -49,7 +49,8 @@ def quick(monkeypatch):
     from dmpcli.instruments import clock
 
     monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
-    monkeypatch.setattr("dmpcli.control.watchdog.watched", lambda robot: robot)
+    for module in ("record", "execute"):
+        monkeypatch.setattr(f"dmpcli.workflows.{module}.watched", lambda robot: robot)
     monkeypatch.setattr("dmpcli.records.journal.Journal._keep", lambda _: None)
 
 

@@ -1,0 +1,183 @@
+"""What a robot program says, move by move, and the strokes that come of it.
+
+Our programs mark where a stroke begins and ends in a comment; the moves between are the stroke, and
+it begins where the move before the mark has led. A program without marks is one stroke.
+"""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
+from dmpcli.formats.motion import MotionStroke
+from dmpcli.records.file_io import Source
+from dmpcli.spatial.rotations import log
+
+Poses = Callable[[Floats], tuple[Floats, Floats | None]]
+"""From the numbers of a program's targets, shape (n, k), to positions, mm, and rotations."""
+
+BEGIN, END = "stroke", "end of stroke"
+
+MOST_MOVES = 5_000_000
+
+
+@dataclass
+class ProgramMoves:
+    """Targets in order, and how each is reached: by speed, turning speed or in a time.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    targets : list of tuple of float
+        As they stand in the program.
+    lines : list of int
+    speed, turn, seconds : list of float
+        mm/s, rad/s and s; NaN where it is not said.
+    marks : list of (int, str or None)
+        Before which move a stroke begins, or None: ends.
+    """
+
+    name: str
+    targets: list[tuple[float, ...]] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
+    speed: list[float] = field(default_factory=list)
+    turn: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    marks: list[tuple[int, str | None]] = field(default_factory=list)
+
+    def move(
+        self,
+        line: int,
+        target: tuple[float, ...],
+        speed: float = math.nan,
+        turn: float = math.nan,
+        seconds: float = math.nan,
+    ) -> None:
+        """Take one move.
+
+        Raises
+        ------
+        InputError
+            A number is not finite, a speed not above 0, or a time below 0.
+        """
+        if not all(map(math.isfinite, target)):
+            raise self.wrong(line, "a coordinate is not a finite number")
+        if speed <= 0.0 or turn <= 0.0 or seconds < 0.0 or math.inf in (speed, turn, seconds):
+            raise self.wrong(line, "a speed must be above 0, a time at least 0")
+        self.targets.append(target)
+        self.lines.append(line)
+        self.speed.append(speed)
+        self.turn.append(turn)
+        self.seconds.append(seconds)
+
+    def wait(self, line: int, seconds: float) -> None:
+        """Take a pause; before the first move it is none of a stroke."""
+        if self.targets:
+            self.move(line, self.targets[-1], seconds=seconds)
+
+    def mark(self, comment: str) -> None:
+        """Take what a comment says, if it is one of ours."""
+        found = _MARK.fullmatch(comment.strip())
+        if found:
+            self.marks.append((len(self.targets), None if found[1] == END else found[2].strip()))
+
+    def wrong(self, line: int, what: str) -> InputError:
+        """Return the error that says what is wrong with a line."""
+        return InputError(f"{self.name}: line {line}: {what}")
+
+    def strokes(self, poses: Poses) -> list[MotionStroke]:
+        """Return the strokes, each with time from 0.
+
+        Raises
+        ------
+        InputError
+            There is no move, or one whose speed nothing says.
+        """
+        if len(self.targets) < 2:
+            raise InputError(f"{self.name}: holds no moves that could be a stroke")
+        position, rotation = poses(np.array(self.targets, dtype=float))
+        seconds = self._seconds(position, rotation)
+        found = []
+        for number, (first, last, name) in enumerate(self._spans()):
+            if last - first < 1:
+                continue
+            t = np.concatenate([[0.0], np.cumsum(seconds[first:last])])
+            kept = np.concatenate([[True], np.diff(t) > 0.0])
+            if kept.sum() < 2:
+                continue
+            rows = np.arange(first, last + 1)[kept]
+            R = None if rotation is None else rotation[rows]
+            stroke = MotionStroke(t[kept], position[rows], R, id=name or str(number + 1))
+            found.append(stroke)
+        if not found:
+            raise InputError(f"{self.name}: holds no moves that could be a stroke")
+        return found
+
+    def _seconds(self, position: Floats, rotation: Floats | None) -> Floats:
+        """Duration of the leg that leads to each move from the second on, shape (n - 1,), s."""
+        length = np.linalg.norm(np.diff(position, axis=0), axis=1)
+        turned = np.zeros(len(length))
+        if rotation is not None:
+            step = np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]
+            turned = np.linalg.norm(log(step), axis=1)
+        said, speed, turn = (np.array(v)[1:] for v in (self.seconds, self.speed, self.turn))
+        by_turn = np.where(turned > 0.0, turned / turn, 0.0)
+        # A leg that does not lead anywhere takes as long as it turns.
+        moved = np.where(length > 0.0, length / speed, by_turn)
+        seconds = np.where(np.isnan(said), moved, said)
+        for first, last, _ in self._spans():
+            bad = np.flatnonzero(~np.isfinite(seconds[first:last]))
+            if len(bad):
+                raise self.wrong(
+                    self.lines[first + int(bad[0]) + 1], "nothing says how fast this move is"
+                )
+        return seconds
+
+    def _spans(self) -> list[tuple[int, int, str]]:
+        """First and last move of each stroke, and its name."""
+        last = len(self.targets) - 1
+        if not any(name is not None for _, name in self.marks):
+            return [(0, last, "")]
+        spans: list[tuple[int, int, str]] = []
+        begun: tuple[int, str] | None = None
+        for at, name in [*self.marks, (len(self.targets), None)]:
+            if begun is not None:
+                spans.append((begun[0], at - 1, begun[1]))
+            begun = None if name is None else (max(at - 1, 0), name)
+        return spans
+
+
+_MARK = re.compile(r"(stroke|end of stroke) (.{0,200})")
+
+
+def lines_of(source: Source) -> list[str]:
+    """Return the lines of a program's text.
+
+    Raises
+    ------
+    InputError
+        It is not text.
+    """
+    try:
+        text = source.content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = source.content.decode("latin-1")
+    if "\x00" in text:
+        raise InputError(f"{source.name}: is not a program in text")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def spelled(name: str) -> str:
+    """Return a stroke's name as a comment may hold it."""
+    return re.sub(r"[^\w.+\-]+", "_", name) or "_"
+
+
+def identifier(name: str, most: int) -> str:
+    """Return a name as a program's routine may have it."""
+    clean = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "stroke"
+    return (clean if clean[0].isalpha() else f"s_{clean}")[:most]

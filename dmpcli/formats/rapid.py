@@ -1,0 +1,171 @@
+r"""RAPID of ABB, written and read: ``MoveL`` to robtargets, mm and quaternions w, x, y, z.
+
+A move carries its speed (``\V``, mm/s) or its duration (``\T``, s), and the radius of its corner
+(``\Z``, mm). Positions are in wobj0, which is the base where base and world agree. Language: RAPID
+Instructions, Functions and Data types, ABB.
+"""
+
+import re
+
+import numpy as np
+
+from dmpcli.arrays import Floats
+from dmpcli.formats import program_moves
+from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, identifier, spelled
+from dmpcli.formats.text import number, significant
+from dmpcli.formats.toolpath import (
+    GRAVITY,
+    ProgramOptions,
+    centre_on_flange,
+    legs,
+    parts,
+    toolpaths,
+)
+from dmpcli.records.file_io import Source
+from dmpcli.records.rotation_forms import wrong
+from dmpcli.spatial.rotations import from_quaternion, to_quaternion
+from dmpcli.spatial.wrench import Tool
+
+LONGEST_NAME = 32
+_EXTERNAL = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
+
+
+def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
+    """Return a module whose procedure ``main`` draws all strokes.
+
+    Raises
+    ------
+    InputError
+        A stroke says no orientation.
+    """
+    motion.rotation_needed("RAPID")
+    body: list[str] = []
+    travel = rf"v1000\V:={significant(options.travel)}"
+    tail = r"tStroke\WObj:=wobj0;"
+    for path in toolpaths(motion, options, 4):
+        assert path.rotation is not None
+        q = to_quaternion(path.rotation)
+        targets = [_target(p, one) for p, one in zip(path.position, q, strict=True)]
+        if options.lift:
+            body.append(f"MoveL {_target(path.before, q[0])}, {travel}, fine, {tail}")
+        body.append(f"MoveL {targets[0]}, {travel}, fine, {tail}")
+        body.append(f"! {BEGIN} {spelled(path.id)}")
+        for leg in legs(path, options.blend):
+            if leg.pause:
+                body.append(f"WaitTime {significant(leg.seconds)};")
+                continue
+            how = rf"v1000\T:={significant(leg.seconds)}"
+            if leg.speed is not None:
+                how = rf"v1000\V:={significant(leg.speed)}"
+            zone = rf"z1\Z:={number(leg.blend, 3)}" if leg.blend else "fine"
+            body.append(f"MoveL {targets[leg.index]}, {how}, {zone}, {tail}")
+        body.append(f"! {END} {spelled(path.id)}")
+        if options.lift:
+            body.append(f"MoveL {_target(path.after, q[-1])}, {travel}, fine, {tail}")
+    groups = list(parts(len(body), options.lines))
+    lines = [f"MODULE {identifier(name, LONGEST_NAME)}", *_tool(options.tool, options.payload)]
+    lines += ["", "  PROC main()", r"    ConfL \Off;", r"    ConfJ \Off;"]
+    if options.tool is None:
+        lines.append("    tStroke := CTool();")
+    lines += [*(f"    Part_{i + 1};" for i in range(len(groups))), "  ENDPROC"]
+    for i, group in enumerate(groups):
+        lines += ["", f"  PROC Part_{i + 1}()", *(f"    {body[k]}" for k in group), "  ENDPROC"]
+    return ("\n".join([*lines, "ENDMODULE", ""])).encode()
+
+
+def _target(position: Floats, q: Floats) -> str:
+    x, y, z, w = q.tolist()
+    place = ",".join(number(v, 4) for v in position.tolist())
+    return f"[[{place}],[{','.join(number(v, 8) for v in (w, x, y, z))}],{_EXTERNAL}]"
+
+
+def _tool(tool: Tool | None, payload: bool) -> list[str]:
+    if tool is None:
+        empty = "[TRUE,[[0,0,0],[1,0,0,0]],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]]"
+        return [
+            "  ! The tool is the one that is active on the controller.",
+            f"  PERS tooldata tStroke := {empty};",
+        ]
+    x, y, z, w = to_quaternion(tool.tcp_rotation).tolist()
+    place = ",".join(number(v, 4) for v in tool.tcp_position.tolist())
+    turn = ",".join(number(v, 8) for v in (w, x, y, z))
+    mass, centre = "0.001", "0,0,0.001"
+    if payload:
+        mass = significant(tool.weight / GRAVITY)
+        centre = ",".join(number(v, 3) for v in centre_on_flange(tool).tolist())
+    load = f"[{mass},[{centre}],[1,0,0,0],0,0,0]"
+    return [f"  PERS tooldata tStroke := [TRUE,[[{place}],[{turn}]],{load}];"]
+
+
+_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LIST = re.compile(_N)
+_MOVE = re.compile(
+    rf"MoveL\s+\[\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]\s*,[^;]*?\]\s*\]\s*,\s*"
+    rf"(?:v({_N}|max)|\[\s*({_N})[^\]]*\])\s*(?:\\([VT])\s*:=\s*({_N}))?\s*,[^;]*;",
+    re.IGNORECASE,
+)
+_WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.IGNORECASE)
+_HARMLESS = re.compile(
+    r"(MODULE\s+\w+.*|ENDMODULE|(LOCAL\s+)?PROC\s+\w+\s*\(\s*\)|ENDPROC|"
+    r"(LOCAL\s+)?(PERS|CONST|VAR|TASK)\s.*;|\w+\s*;|(ConfL|ConfJ|SingArea|AccSet)\b.*;|"
+    r"\w+\s*:=\s*CTool\s*\(\s*\)\s*;|%%%|VERSION:.*|LANGUAGE:.*)",
+    re.IGNORECASE,
+)
+
+
+def decode(source: Source) -> list[MotionStroke]:
+    """Read a module of straight moves.
+
+    Raises
+    ------
+    InputError
+        It holds what is neither a straight move to a target nor harmless; names the line.
+    """
+    moves = ProgramMoves(source.name)
+    for line, text in enumerate(program_moves.lines_of(source), 1):
+        code, _, comment = text.partition("!")
+        code = code.strip()
+        if comment:
+            moves.mark(comment)
+        wait, found = _WAIT.fullmatch(code), None
+        if code[:5].lower() == "movel":
+            found = _MOVE.fullmatch(code)
+        if wait:
+            moves.wait(line, float(wait[1]))
+        elif found:
+            _move(moves, line, found)
+        elif code and not _HARMLESS.fullmatch(code):
+            raise moves.wrong(
+                line,
+                f"{code[:60]!r} is not read: only MoveL to robtargets of numbers, WaitTime, and "
+                "procedures in the order in which they are called",
+            )
+    return moves.strokes(_poses)
+
+
+def _move(moves: ProgramMoves, line: int, found: re.Match[str]) -> None:
+    place, turn = (_numbers(found[i]) for i in (1, 2))
+    if len(place) != 3 or len(turn) != 4:
+        raise moves.wrong(line, "a robtarget needs 3 coordinates and 4 of a quaternion")
+    bad = wrong("wxyz", np.array([turn]))
+    if bad is not None:
+        raise moves.wrong(line, bad[1])
+    if (found[5] or "").upper() == "T":
+        moves.move(line, (*place, *turn), seconds=float(found[6]))
+        return
+    said = found[6] or found[3] or found[4]
+    speed = 7000.0 if said.lower() == "max" else float(said)
+    moves.move(line, (*place, *turn), speed)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    parts_ = [part.strip() for part in text.split(",")]
+    if not all(_LIST.fullmatch(part) for part in parts_):
+        return ()
+    return tuple(map(float, parts_))
+
+
+def _poses(values: Floats) -> tuple[Floats, Floats]:
+    q = values[:, [4, 5, 6, 3]]
+    return values[:, :3], from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))

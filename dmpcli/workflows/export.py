@@ -1,0 +1,168 @@
+"""`export`: strokes in, a file of another program out."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dmpcli.errors import InputError, counted
+from dmpcli.formats import registry
+from dmpcli.formats.motion import Motion
+from dmpcli.formats.registry import FileFormat
+from dmpcli.formats.toolpath import ProgramOptions
+from dmpcli.kinematics import models
+from dmpcli.messages import tell
+from dmpcli.records import file_io, tool
+from dmpcli.settings.export import ExportOptions
+from dmpcli.spatial.rotations import from_euler
+from dmpcli.workflows import motions
+
+ID = "{id}"
+"""In the name of an output: for a file of each stroke."""
+
+NAME = "dmpcli_stroke"
+"""Of a program that goes to standard output."""
+
+
+def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> FileFormat:
+    """Refuse an output that could not be written, and options that say nothing of its format.
+
+    Raises
+    ------
+    InputError
+    """
+    chosen = registry.format_of(output, options.format)
+    of_programs = ("thin", "blend", "lift", "travel_speed", "acceleration", "lines")
+    alone = [name for name in of_programs if name in given and not chosen.program]
+    if chosen.word != "gcode":
+        alone += ["tilt"] if "tilt" in given else []
+    if chosen.word != "joints":
+        alone += ["robot_model"] if "robot_model" in given else []
+    if not (chosen.program or chosen.word == "joints") and "tool" in given:
+        alone.append("tool")
+    if alone:
+        flag = f"--{alone[0].replace('_', '-')}"
+        raise InputError(f"{flag}: says nothing of {chosen.word}; leave it out")
+    if chosen.word == "joints" and options.robot_model is None:
+        raise InputError("--format joints: of which arm? Name it, as in --robot-model ec66")
+    if ID not in Path(output).name:
+        file_io.check_writable(output)
+    return chosen
+
+
+def export(motion: Motion, output: str | Path, chosen: FileFormat, options: ExportOptions) -> None:
+    """Write the strokes of a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+    output : str or Path
+        With ``{id}`` in its name a file of each stroke.
+    chosen : FileFormat
+    options : ExportOptions
+
+    Raises
+    ------
+    InputError, RefusedError
+        The format cannot hold them, or an arm cannot follow them.
+    """
+    prepared = _prepared(motion, chosen, options)
+    name = Path(output).name
+    if ID in name:
+        for one in prepared.strokes:
+            safe = "".join(c if c.isalnum() or c in "-_.+" else "_" for c in one.id)
+            file = Path(output).with_name(name.replace(ID, safe))
+            _write(replace(prepared, strokes=[one]), file, chosen, options)
+    else:
+        _write(prepared, output, chosen, options)
+    samples = sum(len(one) for one in prepared.strokes)
+    tell(
+        f"{file_io.shown(output, output=True)}: {chosen.word}, "
+        f"{counted(len(prepared.strokes), 'stroke')}, {counted(samples, 'sample')}"
+    )
+
+
+def _prepared(motion: Motion, chosen: FileFormat, options: ExportOptions) -> Motion:
+    motion = motions.chosen(motion, options.id)
+    if options.orientation is not None:
+        if motion.oriented:
+            raise InputError(
+                f"--orientation: {motion.name} says how the tool is turned; leave it out"
+            )
+        motion = motion.turned(from_euler(np.array(options.orientation)))
+    if options.rate is not None:
+        motion = motions.evenly(motion, options.rate)
+    if chosen.word == "joints":
+        from dmpcli.formats.joint_table import with_joints
+
+        assert options.robot_model is not None
+        held = None if options.tool is None else tool.geometry(file_io.read(options.tool))
+        motion = with_joints(motion, models.model(options.robot_model), held)
+    return motion
+
+
+def _write(motion: Motion, output: str | Path, chosen: FileFormat, options: ExportOptions) -> None:
+    stem = NAME if str(output) == file_io.DASH else Path(output).name.split(".")[0]
+    file_io.write(output, encoded(motion, chosen, options, stem))
+
+
+def encoded(motion: Motion, chosen: FileFormat, options: ExportOptions, name: str) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    motion : Motion
+    chosen : FileFormat
+    options : ExportOptions
+    name : str
+        Of a program.
+    """
+    from dmpcli.formats import (
+        csv_table,
+        gcode,
+        joint_table,
+        krl,
+        polylines,
+        rapid,
+        tum,
+        urscript,
+    )
+
+    if chosen.program:
+        program = program_options(options)
+        if chosen.word == "gcode":
+            return gcode.encode(motion, program)
+        writers = {"urscript": urscript.encode, "krl": krl.encode, "rapid": rapid.encode}
+        return writers[chosen.word](motion, program, name)
+    tables: dict[str, Callable[[Motion], bytes]] = {
+        "csv": csv_table.encode,
+        "tum": tum.encode,
+        "joints": joint_table.encode,
+        "ply": polylines.encode_ply,
+        "obj": polylines.encode_obj,
+    }
+    return tables[chosen.word](motion)
+
+
+def program_options(options: ExportOptions) -> ProgramOptions:
+    """Return how a program shall move."""
+    held, payload = None, False
+    if options.tool is not None:
+        source = file_io.read(options.tool)
+        try:
+            held, payload = tool.decode(source), True
+        except InputError:
+            held = tool.geometry(source)
+    return ProgramOptions(
+        options.thin,
+        options.blend,
+        options.lift,
+        options.travel_speed,
+        options.acceleration,
+        options.lines,
+        float(np.radians(options.tilt)),
+        held,
+        payload,
+    )
