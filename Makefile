@@ -10,6 +10,7 @@
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
 #   make soak        200 recordings killed at random: what is lost
+#   make mutations   damaged and crafted inputs for every reader: what is not refused
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -35,7 +36,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak cluster-demo \
+.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak mutations cluster-demo \
     samples pictures schemas clean FORCE
 
 help:
@@ -112,6 +113,9 @@ bench: $(VENV)/installed
 
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
+
+mutations: $(VENV)/installed
+	$(BIN)/python -m benchmarks.mutations --keep $(OUT)/mutations
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 

@@ -104,7 +104,7 @@ def as_text(found: Row, width: int) -> str:
         lines += textwrap.wrap(tolerance_mark.text(found["file"], found["mark"]), width)
     said = {key: value for key, value in found.get("provenance", {}).items() if value}
     said |= {"sha256": found["sha256"]} | found.get("content", {})
-    wide = max(len(key) for key in said)
+    wide = min(max(len(key) for key in said), _WIDEST)
     for key, value in said.items():
         text, indent = f"{key:<{wide}}  {_flat(value)}", " " * (wide + 2)
         lines += textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
@@ -338,6 +338,9 @@ def _extent(found: Row) -> str:
         text += f" at {found['rate']:.6g} Hz"
     return text
 
+
+_WIDEST = 40
+"""Characters of a key that values are indented by: a longer one would leave them no room."""
 
 LISTED = 500
 """Columns that the description for people lists; the other form has all."""
