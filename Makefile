@@ -13,6 +13,7 @@
 #   make peers       the same beside other packages, in an environment of their own
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
+#   make mutations   damaged and crafted inputs for every reader: what is not refused
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -39,7 +40,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers faults \
-    soak cluster-demo samples pictures schemas clean FORCE
+    soak mutations cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -125,6 +126,9 @@ faults: $(VENV)/installed
 
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
+
+mutations: $(VENV)/installed
+	$(BIN)/python -m benchmarks.mutations --keep $(OUT)/mutations
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 

@@ -7,10 +7,12 @@ import sys
 from typing import Annotated, Any
 
 import typer
+from click import ClickException
 from typer.core import TyperCommand, TyperGroup
 
 from dmpcli.commands.pose_arguments import joined
-from dmpcli.errors import DmpError, UnconfirmedStopError
+from dmpcli.errors import DmpError, UnconfirmedStopError, printable
+from dmpcli.messages import prepare_streams, say
 from dmpcli.version import __version__
 
 CONTEXT = {"help_option_names": ["-h", "--help"]}
@@ -68,7 +70,11 @@ class Group(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words after the program's name; poses of six words become one value."""
-        return super().parse_args(ctx, joined(args))
+        try:
+            return super().parse_args(ctx, joined(args))
+        except ClickException as error:
+            error.message = printable(error.message)  # type: ignore[misc]
+            raise
 
     def invoke(self, ctx: Any) -> Any:
         """Run the subcommand."""
@@ -76,8 +82,11 @@ class Group(TyperGroup):
             return super().invoke(ctx)
         except DmpError as error:
             _show_defect(error)
-            print(f"dmpcli: {error}", file=sys.stderr)  # noqa: T201
+            say(f"dmpcli: {error}")
             sys.exit(error.exit_code)
+        except ClickException as error:
+            error.message = printable(error.message)  # type: ignore[misc]
+            raise
         except BrokenPipeError:
             sys.exit(128 + signal.SIGPIPE)
 
@@ -110,6 +119,7 @@ def options(
 
 def main() -> None:
     """Console entry point."""
+    prepare_streams()
     # Before numpy is loaded: with more threads the last bits of a product depend on the number of
     # cores, and these matrices are too small to gain from them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -4,6 +4,7 @@ A message is one or two lines: what is wrong, where (file, column, row), what to
 """
 
 import contextlib
+import re
 from collections.abc import Iterator
 
 
@@ -36,6 +37,29 @@ class UnconfirmedStopError(InstrumentError):
 
     Its cause, where that is a defect of ours, is shown with its traceback before.
     """
+
+
+# Control characters but for tab and newline, what turns the direction of writing or ends a line
+# unseen, and halves of characters, as file names that are no text have them.
+_UNPRINTED = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+_FEIGNED = re.compile(r"\n(?=dmpcli: )")
+
+
+def printable(text: str) -> str:
+    r"""Return a text as it may be printed: names and values in it move no cursor, hide no words.
+
+    What would is shown as ``\u001b``, which within JSON means the same as before; and no line but
+    the first begins as this program's own messages do.
+
+    Parameters
+    ----------
+    text : str
+        May hold what files, controllers and the command line say.
+    """
+    shown = _UNPRINTED.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _FEIGNED.sub("\n  ", shown)
 
 
 def counted(number: int, what: str) -> str:

@@ -6,8 +6,12 @@ standard error, and a program that calls the package decides for itself.
 
 import contextlib
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterator
+from typing import Any
+
+from dmpcli.errors import printable
 
 LOG = logging.getLogger("dmpcli")
 
@@ -18,8 +22,55 @@ class Terminal(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write one message; what a person must know carries the program's name."""
         said = record.getMessage()
-        text = said if record.levelno < logging.WARNING else f"dmpcli: {said}"
-        print(text, file=sys.stderr)  # noqa: T201
+        say(said if record.levelno < logging.WARNING else f"dmpcli: {said}")
+
+
+class Unbreakable:
+    """Standard error that raises nothing: who listens no longer must not end what goes on.
+
+    Parameters
+    ----------
+    stream : TextIO
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write what can be written."""
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Bring out what can be."""
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def prepare_streams() -> None:
+    """Make standard error one that raises nothing, and fill the places of what is closed.
+
+    The next file to be opened would else get number 2, and what libraries complain of would be
+    written into it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    stream = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stderr = Unbreakable(stream)
+
+
+def say(text: str) -> None:
+    """Write lines to standard error, with what they name made printable."""
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError, ValueError):
+            print(printable(text), file=sys.stderr)  # noqa: T201
 
 
 def on_terminal(quiet: bool) -> None:

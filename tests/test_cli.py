@@ -1,5 +1,7 @@
 """The front door: what it loads, what it says, how it ends."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -83,3 +85,101 @@ def test_a_defect_of_ours_keeps_its_traceback_and_is_exit_code_1(monkeypatch):
     done = CliRunner().invoke(cli.app, ["inspect", "a.csv"])
     assert done.exit_code == 1
     assert isinstance(done.exception, ZeroDivisionError)
+
+
+CURSOR = "\x1b[2J\x1b]0;owned\x07\x9b1m\r"
+
+
+def test_control_characters_of_names_are_shown_and_not_obeyed(tmp_path):
+    """In a file's name, an option's, an id, a column; on both streams, as text and as JSON."""
+    file = tmp_path / f"a{CURSOR}.csv"
+    rows = "".join(f"{0.02 * i},{i},0,0,{i}\n" for i in range(20))
+    file.write_bytes(f"t,x,y,z,col{CURSOR[:-1]}\n{rows}".encode())
+    for words in (
+        ["inspect", str(file)],
+        ["inspect", str(file), "--json"],
+        ["inspect", str(tmp_path / f"none{CURSOR}")],
+        ["inspect", f"--none{CURSOR}"],
+        [f"none{CURSOR}"],
+        ["fit", str(file), "-o", str(tmp_path / f"s{CURSOR}.json")],
+        ["report", str(file), str(file)],
+    ):
+        done = CliRunner().invoke(cli.app, words)
+        assert done.exit_code in (0, 2, 3), words
+        for said in (done.stdout, done.stderr):
+            assert not set(said) & set(CURSOR) - set("2J]0;owned[1m"), words
+        # The parser of the command line has its own way to show them.
+        assert r"\u001b" in done.stdout + done.stderr or r"\x1b" in done.stderr, words
+
+
+def test_an_id_that_would_be_obeyed_is_refused(tmp_path):
+    file = tmp_path / "pairs.csv"
+    file.write_text('id,x0,y0,z0,xg,yg,zg\n"a\ndmpcli: all drawn",0,0,0,50,0,0\n')
+    skill = ROOT / "sample_runs" / "reference.parquet"
+    done = CliRunner().invoke(cli.app, ["fit", str(skill), "-o", str(tmp_path / "s.json")])
+    words = [
+        "generalize",
+        str(tmp_path / "s.json"),
+        "--pairs",
+        str(file),
+        "-o",
+        str(tmp_path / "b"),
+    ]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == 2
+    assert "column 'id', line 2: 'a\\ndmpcli: all drawn' holds a control character" in done.stderr
+
+
+LINE = ["--reference", "line", "--duration", "1.5", "--start", "-551", "131", "-17.56"]
+LINE += ["--goal", "-561", "131", "-17.56"]
+
+
+@pytest.mark.parametrize("words", [["record", "-o", "-", *LINE], ["inspect", "none.csv"]])
+@pytest.mark.parametrize("how", ["closed", "broken"])
+def test_whoever_closes_standard_error_changes_no_output_and_no_exit_code(how, words, tmp_path):
+    command = [sys.executable, "-m", "dmpcli", *words]
+    sound = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
+    assert sound.stderr
+    if how == "closed":
+        done = subprocess.run(
+            command,
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            preexec_fn=lambda: os.close(2),
+            check=False,
+        )
+    else:
+        reader, writer = os.pipe()
+        os.close(reader)
+        with os.fdopen(writer, "wb") as broken:
+            done = subprocess.run(
+                command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=broken, check=False
+            )
+    assert (done.returncode, done.stdout) == (sound.returncode, sound.stdout)
+
+
+def test_a_closed_standard_error_is_no_file_of_the_run(tmp_path):
+    """The next file that is opened would get its number, and what libraries complain of."""
+    code = (
+        "import os, sys\n"
+        "from dmpcli.messages import prepare_streams, say\n"
+        "prepare_streams()\n"
+        "file = open('journal', 'wb')\n"
+        "os.write(2, b'a library complains'); say('so do we')\n"
+        "file.write(b'%d' % (file.fileno() > 2))\n"
+    )
+    command = [sys.executable, "-c", code]
+    subprocess.run(command, cwd=tmp_path, preexec_fn=lambda: os.close(2), check=True)
+    assert (tmp_path / "journal").read_bytes() == b"1"
+
+
+def test_a_reader_of_standard_output_that_has_gone_is_still_told_by_the_exit_code(tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "dmpcli", "record", "-o", "-", *LINE]
+    with os.fdopen(writer, "wb") as broken:
+        done = subprocess.run(
+            command, cwd=tmp_path, stdout=broken, stderr=subprocess.PIPE, check=False
+        )
+    assert done.returncode == 128 + signal.SIGPIPE
+    assert b"Traceback" not in done.stderr

@@ -1,10 +1,11 @@
+import json
 import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.errors import beside
+from dmpcli.errors import beside, printable
 
 
 @pytest.mark.parametrize(
@@ -29,3 +30,22 @@ def test_no_number_crosses_or_meets_its_bound(bound, share, form):
     for value in (bound * (1.0 + share), bound * (1.0 - share)):
         text = float(beside(value, bound, form))
         assert (text - bound) * (value - bound) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ("a\x1b[2Jb", r"a\u001b[2Jb"),
+        ("a\rdmpcli: done", r"a\u000ddmpcli: done"),
+        ("\x9b31m \x7f", r"\u009b31m \u007f"),
+        ("moc.\u202egpj", r"moc.\u202egpj"),
+        ("bad\udcff", r"bad\udcff"),
+        ("a\u2028b\x85", r"a\u2028b\u0085"),
+        ("first\nsecond\tthird", "first\nsecond\tthird"),
+        ("name\ndmpcli: done, all is well", "name\n  dmpcli: done, all is well"),
+        ("mm² ± 3° – Größe 長さ", "mm² ± 3° – Größe 長さ"),
+    ],
+)
+def test_what_would_move_a_cursor_or_hide_words_is_shown(said, shown):
+    assert printable(said) == shown
+    assert json.loads(printable(json.dumps(said, ensure_ascii=False)).replace("\n", "")) == said

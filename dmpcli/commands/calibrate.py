@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from dmpcli.spatial.wrench import Tool
 
 
+BESIDE = ".poses.parquet"
+"""What is put after the output's name for poses that nobody asked to keep, if all else fails."""
+
+
 @with_options
 def command(
     *,
@@ -103,13 +107,15 @@ class CalibrationRequest:
 
     @property
     def replaces(self) -> bool:
-        """Whether a file that appears meanwhile may be replaced: the same can be made again."""
+        """Whether a file that appears meanwhile may be replaced."""
+        return self.from_file or self.force or self.repeatable
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether the same can be measured again."""
         from dmpcli.control import workcell
 
-        if self.from_file or self.force:
-            return True
-        addresses = workcell.check(self.robot, self.sensor, self.allow_mixed)
-        return workcell.repeatable(addresses)
+        return workcell.repeatable(workcell.check(self.robot, self.sensor, self.allow_mixed))
 
 
 def _from_file(settings: "CalibrateSettings", request: CalibrationRequest, name: str) -> None:
@@ -159,6 +165,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     lock.take()
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
+    failed = True
     moving: UnconfirmedStopError | None = None
     options = {"robot": workcell.in_provenance(request.robot), "by_hand": request.by_hand}
     options |= {"sensor": workcell.in_provenance(request.sensor), "realtime": realtime}
@@ -166,6 +173,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         with Interruption() as interruption:
             info = bench.sensor.open()
             _take(bench, info, clock, settings, interruption, keyboard, taken, lock)
+        failed = False
     except Interrupted as stop:
         warn(str(stop))
         raise typer.Exit(128 + stop.number) from None
@@ -177,7 +185,8 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         closing = guards.leave(bench.robot.close, bench.sensor.close, lock.release)
         if taken and info is not None:
             try:
-                _save(taken, geometry, info, settings, request, source, options)
+                name = _poses_name(request, failed or closing is not None)
+                _save(taken, geometry, info, settings, request, source, options, name)
             except InputError as error:
                 if moving is None:
                     raise
@@ -188,11 +197,11 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     sources = {} if source is None else {"tool": source}
     try:
         _conclude(taken, geometry, result.identity(info), settings, request, sources, options)
-    except RefusedError as refused:
-        if request.save is not None or not (request.by_hand and taken):
-            raise
-        lost = counted(len(taken), "pose")
-        raise RefusedError(f"{refused}; {lost} not kept: --save POSES keeps them") from None
+    except RefusedError:
+        if request.save is None and info is not None:
+            name = _poses_name(request, failed=True)
+            _save(taken, geometry, info, settings, request, source, options, name)
+        raise
 
 
 def _take(
@@ -248,6 +257,15 @@ def _check_existing(request: CalibrationRequest, repeatable: bool) -> None:
             )
 
 
+def _poses_name(request: CalibrationRequest, failed: bool) -> str | None:
+    """Return where the poses are kept: as asked, or beside the output where they would be lost."""
+    if request.save is not None or not failed:
+        return request.save
+    if request.output == "-" or not (request.by_hand or not request.repeatable):
+        return None
+    return f"{request.output}{BESIDE}"
+
+
 def _save(
     taken: "list[StaticPose]",
     geometry: "Tool",
@@ -256,14 +274,17 @@ def _save(
     request: CalibrationRequest,
     source: "Source | None",
     options: dict[str, Any],
+    name: str | None,
 ) -> None:
+    """Keep the poses under a name; None where nobody asked, and they can be measured again."""
     from dmpcli.calibration import result
+    from dmpcli.messages import warn
     from dmpcli.records import static_poses
     from dmpcli.records import tool as tool_file
     from dmpcli.records.record import Provenance, input_of
-    from dmpcli.workflows.run_output import write_once
+    from dmpcli.workflows.run_output import kept_as, write_once
 
-    if request.save is None:
+    if name is None:
         return
     facts = {
         "geometry": tool_file.transforms(geometry),
@@ -271,7 +292,12 @@ def _save(
     }
     inputs = () if source is None else (input_of("tool", source),)
     provenance = Provenance("calibrate", options | settings.as_options(), inputs, facts)
-    write_once(request.save, static_poses.encode(taken, provenance), request.replaces)
+    content = static_poses.encode(taken, provenance)
+    if name == request.save:
+        write_once(name, content, request.replaces)
+        return
+    found = kept_as(name, content, replaces=False)
+    warn(f"{counted(len(taken), 'pose')} kept in {found}: calibrate --from reads them")
 
 
 def _conclude(
@@ -307,10 +333,13 @@ def _conclude(
 
 
 def _show(found: "Identification") -> None:
+    import io
+
     from rich.console import Console
     from rich.table import Table
 
     from dmpcli.calibration import result
+    from dmpcli.messages import tell
 
     table = Table(box=None, pad_edge=False)
     table.add_column("")
@@ -319,4 +348,6 @@ def _show(found: "Identification") -> None:
     table.add_column("unit")
     for row in result.table(found):
         table.add_row(*row)
-    Console(stderr=True, width=80, highlight=False).print(table)
+    sink = io.StringIO()
+    Console(file=sink, width=80, highlight=False, color_system=None).print(table)
+    tell(sink.getvalue().rstrip("\n"))

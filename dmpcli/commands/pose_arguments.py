@@ -1,12 +1,16 @@
 """Options whose value is a pose: six words or one file, which option parsers cannot tell apart.
 
 ``--surface-pose X Y Z RX RY RZ`` becomes ``--surface-pose=X Y Z RX RY RZ``, one word, before the
-parser sees it; a file's name passes unchanged. `dmpcli.records.pose.parse` reads both.
+parser sees it; a file's name passes unchanged. `dmpcli.records.pose.parse` reads both. And
+``--workspace none`` becomes the widest box there is.
 """
 
 from collections.abc import Sequence
 
+from dmpcli.settings.ranges import WIDEST
+
 POSE_OPTIONS = ("--surface-pose", "--initial")
+WORKSPACE, NONE = "--workspace", "none"
 NUMBERS = 6
 
 
@@ -23,6 +27,11 @@ def joined(words: Sequence[str], options: Sequence[str] = POSE_OPTIONS) -> list[
         option, equals, first = word.partition("=")
         if word == "--":
             return [*result, word, *rest]
+        if option == WORKSPACE and NONE in (first if equals else "", *rest[: not equals]):
+            # The parser wants six numbers: the widest box that may be named bounds nothing.
+            result += [WORKSPACE, *map(str, WIDEST)]
+            del rest[: not equals]
+            continue
         if option not in options or (equals and not _is_number(first)):
             result.append(word)
             continue

@@ -57,7 +57,7 @@ def command(
     from dmpcli.records import file_io
     from dmpcli.simulation.elite_server import faults as fault_words
     from dmpcli.simulation.elite_server.lab import VirtualLab
-    from dmpcli.simulation.elite_server.lab_server import LabServer, Ports
+    from dmpcli.simulation.elite_server.lab_server import LabServer, Ports, loopback
 
     check(settings)
     if served.lookahead > LONGEST_LOOKAHEAD:
@@ -86,6 +86,12 @@ def command(
         ) as serving:
             line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
             print(line, flush=True)  # noqa: T201
+            if not loopback(served.host):
+                warn(
+                    f"--host {served.host}: whoever reaches this computer there can move the "
+                    "simulated arm and set the sensor, with no password; leave --host out to serve "
+                    "this computer alone"
+                )
             tell("serving; Ctrl-C ends it")
             while signals.number is None:
                 time.sleep(0.1)

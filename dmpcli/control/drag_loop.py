@@ -182,6 +182,7 @@ class Recorder(ControlLoop):
             self._sensor.start(self._settings.sensor_rate)
             state = self._robot.state()
             guards.check_state(state, self._settings.workspace)
+            self._workspace = self._settings.room(state.position)
             self._take(ReadyArm(self._robot, servo, self._clock), self._zeroed(state))
             how, failure = self._run()
             ending = self._outcome(how or "stopped after braking to rest", failure, self._ended)

@@ -15,6 +15,9 @@ from dmpcli.spatial.wrench import LEVER, Tool
 SILENCE = 0.1
 """s without a sample, after which the sensor counts as dead."""
 
+ONE_LOST = 2.5
+"""Periods of the sensor that pass at most where one sample is lost."""
+
 STALE = 2
 """Periods, of the loop or of the sensor if that is slower, after which no force is believed."""
 
@@ -52,6 +55,8 @@ class Sensing:
         # A reading at the share itself is allowed.
         self._limit = np.nextafter(RANGE_SHARE * info.limit, np.inf)
         self._stale = STALE * max(period, 1.0 / rate)
+        # One sample that the network loses is no silence, however slow the sensor.
+        self._silence = max(SILENCE, ONE_LOST / rate)
         self.newest = Sample(clock.now(), 0, np.zeros(6), healthy=True, lost=0)
 
     def first(self, pause: float) -> list[Sample]:
@@ -116,7 +121,7 @@ class Sensing:
         """
         samples = self._poll()
         silent = now - self.newest.t
-        if not silent <= SILENCE:
+        if not silent <= self._silence:
             raise InstrumentError(
                 f"force sensor: silent for {silent:.2f} s, stopped; check cable and power"
             )

@@ -56,6 +56,8 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
             "remove the row or fill it in"
         )
     if column.type == "string":
+        if key == "id":
+            check_ids(values, name)
         return np.asarray(values.to_pylist(), dtype=object)
     array = numbers(values)
     if column.type == "int64":
@@ -71,6 +73,31 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
             "remove the row or mend it"
         )
     return array
+
+
+def check_ids(values: Any, name: str) -> None:
+    """Refuse ids that are not shown as they are: with control characters in them.
+
+    Parameters
+    ----------
+    values : Arrow array of text
+    name : str
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        Names the row.
+    """
+    import pyarrow.compute as pc
+
+    bad = pc.match_substring_regex(values, r"[\x00-\x1f\x7f]")
+    if pc.any(bad).as_py():
+        row = bad.to_pylist().index(True)
+        raise InputError(
+            f"{name}: column 'id', row {row + 1}: {values[row].as_py()!r} holds a control "
+            "character; rename it"
+        )
 
 
 def nulls(values: Any) -> Booleans:

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
-from dmpcli.records.columns import columns_of
+from dmpcli.records.columns import check_ids, columns_of
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
@@ -183,6 +183,8 @@ def _text(table: Any, name: str, column: Column, file: str) -> Any:
         raise InputError(f"{file}: column {name!r} holds {kind}, text is needed") from None
     if column.required and values.null_count:
         raise InputError(f"{file}: column {name!r} has rows without a value; draw the batch again")
+    if name == "id":
+        check_ids(values, file)
     return values
 
 
@@ -328,7 +330,7 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
     carried: dict[str, AnyArray] = {}
     waiting: str | None = None
     for group in range(groups):
-        parquet.judge(name, part.metadata, size, [group])
+        parquet.judge(name, part, size, [group])
         try:
             with untrusted.decoding(name, f"row group {group + 1}"):
                 table = part.read_row_group(group, columns=chosen)

@@ -1,11 +1,13 @@
 """JSON files of ours: read, checked against their model, refused by name; and their schemas."""
 
 import json
+import math
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dmpcli.errors import InputError
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.untrusted import LARGEST_JSON, decoder, judge_size
 
@@ -25,11 +27,46 @@ class JsonPart(BaseModel):
 M = TypeVar("M", bound=BaseModel)
 
 
-def json_document(source: Source) -> dict[str, Any]:
-    """Return the object of a JSON source; InputError where it is not JSON or not an object."""
+def loads(text: str | bytes, odd: list[str]) -> Any:
+    """Parse JSON, and note the numbers that are none: NaN, infinity, and what is beyond `LARGEST`.
+
+    Parameters
+    ----------
+    text : str or bytes
+    odd : list of str
+        Filled with such numbers, each of which is read as not finite: models then name its field.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        It is not JSON.
+    """
+
+    def number(word: str) -> float:
+        value = float(word)
+        if abs(value) <= LARGEST:
+            return value
+        odd.append(word[:40])
+        return math.copysign(math.inf, value) if value == value else value
+
+    def whole(word: str) -> float:
+        return int(word) if abs(number(word)) <= LARGEST else math.inf
+
+    return json.loads(text, parse_float=number, parse_int=whole, parse_constant=number)
+
+
+def json_document(source: Source, odd: list[str] | None = None) -> dict[str, Any]:
+    """Return the object of a JSON source; InputError where it is not JSON or not an object.
+
+    Parameters
+    ----------
+    source : Source
+    odd : list of str, optional
+        As in `loads`.
+    """
     judge_size(source.name, len(source.content), LARGEST_JSON, "a JSON file")
     try:
-        document = json.loads(source.content)
+        document = loads(source.content, [] if odd is None else odd)
     except (ValueError, RecursionError) as error:
         reason = str(error) if isinstance(error, json.JSONDecodeError) else "not text"
         raise InputError(f"{source.name}: is not JSON: {reason}") from None
@@ -63,7 +100,8 @@ def validated(
     InputError
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
-    document = json_document(source)
+    odd: list[str] = []
+    document = json_document(source, odd)
     said = document.get("schema", name if by_hand else None)
     if said != name:
         raise InputError(f"{source.name}: has schema {said!r}, a {name} file is needed")
@@ -74,7 +112,10 @@ def validated(
             "upgrade dmpcli"
         )
     try:
-        return model.model_validate(document)
+        found = model.model_validate(document)
+        if odd:  # where the model takes anything
+            raise InputError(f"{source.name}: {odd[0]} is no finite number; {remedy}")
+        return found
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"]) or "document"

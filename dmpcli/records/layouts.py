@@ -3,6 +3,7 @@
 Each known layout is publicly documented by its makers; docs/conventions.md lists them.
 """
 
+import functools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,7 +39,7 @@ _SPELLINGS = {
     "": "1 -",
 }
 _UNITS = {spelling: unit for unit, all_ in _SPELLINGS.items() for spelling in all_.split()}
-_BRACKETS = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))$")
+_OPENED = {"]": "[", ")": "("}
 _SUFFIX = re.compile(r"^(.+)_(mm|cm|m|s|sec|ms|us|ns|rad|deg)$")
 
 _TIMES = ("t", "time", "Time", "timestamp", "Timestamp", "stamp", "time_s")
@@ -271,6 +272,7 @@ def adapted(base: Layout, mapping: Sequence[str], given: Mapping[str, Any]) -> L
     return replace(base, columns=columns, said=said, **dict(given))
 
 
+@functools.lru_cache(maxsize=1 << 14)
 def parted(name: str) -> tuple[str, str | None]:
     """Part a column's name into the name itself and the unit that it tells.
 
@@ -280,13 +282,16 @@ def parted(name: str) -> tuple[str, str | None]:
         ``x [mm]`` gives x and mm, ``time_ms`` time and ms; an unknown unit comes back as it is,
         and None where there is none.
     """
-    brackets = _BRACKETS.match(name)
-    if brackets:
-        said = (brackets[2] if brackets[2] is not None else brackets[3]).strip()
-        if said.isdigit() and said != "1":
-            return name, None  # an entry of an array
-        unit = _UNITS.get(said, _UNITS.get(said.lower(), said))
-        return brackets[1].strip(), unit or None
+    close = name[-1:]
+    if close in _OPENED:
+        # After the last bracket before: a pattern for this takes the square of a name's length.
+        begin = name.find(_OPENED[close], name.rfind(close, 0, -1) + 1)
+        if begin >= 0:
+            said = name[begin + 1 : -1].strip()
+            if said.isdigit() and said != "1":
+                return name, None  # an entry of an array
+            unit = _UNITS.get(said, _UNITS.get(said.lower(), said))
+            return name[:begin].strip(), unit or None
     suffix = _SUFFIX.match(name)
     return (suffix[1], _UNITS[suffix[2]]) if suffix else (name, None)
 

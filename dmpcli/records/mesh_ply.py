@@ -192,7 +192,8 @@ class _Binary:
         """Positions (n, 3)."""
         at = _at(self._name, element)
         found = self._fixed(element)
-        return np.stack([found[str(i)].astype(float) for i in at], axis=1)
+        with np.errstate(invalid="ignore"):  # what is no number is named where the mesh is mended
+            return np.stack([found[str(i)].astype(float) for i in at], axis=1)
 
     def _fixed(self, element: _Element) -> AnyArray:
         self._room(element)
@@ -241,7 +242,8 @@ class _Binary:
             return None
         self._at += found.nbytes
         key = [name for name, _, _ in element.properties].index(wanted)
-        indices = found[f"{key}"].astype(np.int64)
+        with np.errstate(invalid="ignore"):  # as no vertex is called, which is told
+            indices = found[f"{key}"].astype(np.int64)
         return indices.reshape(-1), np.full(element.rows, indices.shape[1])
 
     def _walked(self, element: _Element, wanted: str) -> tuple[Integers, Integers]:

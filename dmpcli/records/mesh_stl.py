@@ -85,7 +85,8 @@ def binary(source: Source) -> Triangles:
             f"{counted(extra, 'byte')} after the {counted(count, 'facet')} of its header passed "
             f"over{looks}"
         )
-    return _soup(corners.reshape(-1, 3).astype(float), remarks)
+    with np.errstate(invalid="ignore"):  # places that are no numbers are named where it is mended
+        return _soup(corners.reshape(-1, 3).astype(float), remarks)
 
 
 def text(source: Source) -> Triangles:

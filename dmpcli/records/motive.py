@@ -11,7 +11,7 @@ import io
 import numpy as np
 
 from dmpcli.errors import InputError
-from dmpcli.records import tables
+from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
 from dmpcli.records.untrusted import decoder
@@ -50,7 +50,9 @@ def read(source: Source) -> Table:
         )
     head = list(csv.reader(io.StringIO("\n".join(every[: at + 1]))))
     take = dict(zip(head[0][::2], head[0][1::2], strict=False))
+    untrusted.judge_columns(source.name, len(head[-1]))
     names = _names(head[1:], take.get("Length Units", take.get("Units", "")))
+    untrusted.judge_columns(source.name, len(names), names)
     kept = [i for i in range(at + 1, len(every)) if every[i].strip()]
     body = "\n".join(every[i] for i in kept).encode()
     lines = np.array(kept, dtype=np.int64) + 1
@@ -72,6 +74,7 @@ def _names(head: list[list[str]], unit: str) -> list[str]:
     bodies = next((row for row in rows if "Name" in row[:2]), rows[1] if len(rows) > 1 else kinds)
     components = next((row for row in reversed(rows) if {"Position", "Rotation"} & set(row)), kinds)
     names: list[str] = []
+    taken: set[str] = set()
     for column, axis in enumerate(axes):
         if column < 2 or not bodies[column]:
             name = axis or f"column {column + 1}"
@@ -82,7 +85,8 @@ def _names(head: list[list[str]], unit: str) -> list[str]:
             name = f"{bodies[column]}.{what}.{axis}" if axis else f"{bodies[column]}.{what}"
             if what == "Position" and unit:
                 name += f" [{unit}]"
-        while name in names:
+        while name in taken:
             name += "'"
+        taken.add(name)
         names.append(name)
     return names

@@ -1,5 +1,6 @@
 """Start-goal pairs from CSV or Parquet: every row is kept, bad ones with what is wrong."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import tables
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table
@@ -18,6 +20,8 @@ START = ("x0", "y0", "z0")
 GOAL = ("xg", "yg", "zg")
 START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
 FARTHEST = 1e6
 """Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""
@@ -112,7 +116,7 @@ def _column(table: Table, name: str, status: list[str]) -> Floats:
     largest = LARGEST_ANGLE if name.startswith("r") else FARTHEST
     beyond = np.isfinite(values) & (np.abs(values) > largest)
     _mark(table, status, beyond, name, f"is beyond {largest:g}; check its unit")
-    return values
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
 
 
 def _mark(table: Table, status: list[str], bad: Booleans, name: str, what: str) -> None:
@@ -139,6 +143,12 @@ def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
         return [str(row + 1) for row in range(len(table))]
     ids = table.texts("id")
+    odd = next((row for row, name in enumerate(ids) if _CONTROL.search(name)), None)
+    if odd is not None:
+        raise InputError(
+            f"{table.name}: column 'id', {table.at(odd)}: {ids[odd]!r} holds a control character; "
+            "rename it"
+        )
     if len(set(ids)) == len(ids):
         return ids
     seen: dict[str, int] = {}

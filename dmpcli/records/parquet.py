@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -18,7 +17,7 @@ from dmpcli.records.file_io import Source
 MAGIC = b"PAR1"
 
 _NUMBER, _TEXT = 8, 64
-"""Bytes of memory that a value takes; a text as an object of Python."""
+"""Bytes of memory that a value takes at least; a text as an object of Python."""
 
 _FAULTS = (pa.ArrowException, OSError, ValueError, MemoryError)
 
@@ -48,7 +47,7 @@ def opened(source: Source | Path, remedy: str, text: Sequence[str] | None = None
     try:
         with untrusted.decoding(name):
             schema = pq.read_schema(_file(source))
-            untrusted.judge_columns(name, len(schema))
+            untrusted.judge_columns(name, len(schema), schema.names)
             if text is None:
                 text = [field.name for field in schema if _is_text(field.type)]
             return pq.ParquetFile(
@@ -79,27 +78,35 @@ def table(source: Source) -> Any:
     """
     remedy = "make it again"
     file = opened(source, remedy)
-    judge(source.name, file.metadata, len(source.content))
+    judge(source.name, file, len(source.content))
+    names = file.schema_arrow.names
+    double = twice(names)
+    if double is not None:
+        raise InputError(f"{source.name}: column {double!r} is there twice; leave one out")
     try:
         with untrusted.decoding(source.name):
-            found = file.read()
-            double = twice(found.column_names)
-            if double is not None:
-                raise InputError(f"{source.name}: column {double!r} is there twice; leave one out")
-            return _plain(source, found)
+            flat = [field.name for field in file.schema_arrow if not _nested(field.type)]
+            found = _plain(source, file.read(columns=flat))
+            for name in names if len(flat) < len(names) else ():
+                if name not in flat:
+                    found = found.append_column(name, pa.nulls(found.num_rows))
+            return found
     except InputError as error:
         if isinstance(error.__cause__, _FAULTS):
             raise damaged(source.name, remedy) from None
         raise
 
 
-def judge(name: str, metadata: Any, size: int, groups: Sequence[int] | None = None) -> None:
+def judge(name: str, file: Any, size: int, groups: Sequence[int] | None = None) -> None:
     """Refuse a file that takes far more memory than its size lets expect.
+
+    Only what is said of whole row groups is asked: to look at the columns of a crafted footer ends
+    the process, from within the library.
 
     Parameters
     ----------
     name : str
-    metadata : pyarrow.parquet.FileMetaData
+    file : pyarrow.parquet.ParquetFile
     size : int
         Bytes of the file.
     groups : sequence of int, optional
@@ -110,16 +117,32 @@ def judge(name: str, metadata: Any, size: int, groups: Sequence[int] | None = No
     InputError
     """
     with untrusted.decoding(name, "its footer"):
-        untrusted.judge_columns(name, metadata.num_columns)
+        metadata = file.metadata
+        width = sum(_width(field.type) for field in file.schema_arrow)
         taken = 0
         for number in range(metadata.num_row_groups) if groups is None else groups:
             group = metadata.row_group(number)
-            for i in range(group.num_columns):
-                column = group.column(i)
-                width = _TEXT if column.physical_type == "BYTE_ARRAY" else _NUMBER
-                values = max(column.num_values, group.num_rows, 0)
-                taken += width * values + max(column.total_uncompressed_size, 0)
+            if group.num_rows < 0:
+                raise ValueError("a row group of less than no rows")
+            taken += width * group.num_rows
         untrusted.judge_table(name, taken, size)
+
+
+def _width(kind: Any) -> int:
+    """Bytes of memory that a value takes at most; what is nested is not read."""
+    if _is_text(kind) or pa.types.is_dictionary(kind):
+        return _TEXT
+    return 0 if _nested(kind) else max(kind.bit_width // 8, _NUMBER)
+
+
+def _nested(kind: Any) -> bool:
+    """Tell a type whose values have no one width: lists may hold any number of values each."""
+    if _is_text(kind) or pa.types.is_dictionary(kind):
+        return False
+    try:
+        return bool(kind.bit_width < 0)
+    except ValueError:
+        return not pa.types.is_null(kind)
 
 
 def twice(names: Sequence[str]) -> str | None:
@@ -149,11 +172,8 @@ def _plain(source: Source, found: Any) -> Any:
         column = found.column(i)
         taken = 0
         for chunk in column.chunks:
-            lengths = np.asarray(pc.binary_length(chunk.dictionary).fill_null(0), dtype=np.int64)
-            used = np.bincount(
-                np.asarray(chunk.indices.drop_null()), minlength=len(lengths)
-            )  # raises where an index is below 0
-            taken += int((used[: len(lengths)] * lengths).sum())
+            lengths = pc.binary_length(chunk.dictionary)
+            taken += pc.sum(lengths.take(chunk.indices)).as_py() or 0
         untrusted.judge_table(source.name, taken, len(source.content))
         plain = field.with_type(kind.value_type)
         found = found.set_column(i, plain, column.cast(kind.value_type))

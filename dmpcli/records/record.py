@@ -15,6 +15,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import parquet, schemas, untrusted
 from dmpcli.records.columns import TYPES, columns_of, dtype_of
 from dmpcli.records.file_io import PART, TABLE, Source
+from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
@@ -304,7 +305,9 @@ def header_of(table: Any, name: str) -> dict[str, Any]:
             f"{name}: a Parquet file, but not written by dmpcli; fit can read it, see fit --help"
         )
     try:
-        header = json.loads(metadata[KEY])
+        odd: list[str] = []
+        header = loads(metadata[KEY], odd)
+        header = None if odd else header
     except (ValueError, RecursionError):
         header = None
     if not isinstance(header, dict) or not _sound(header):

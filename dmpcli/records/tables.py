@@ -216,7 +216,7 @@ def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
     end = text.find(b"\n") if b"\n" in text else len(text)
     separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
     names = _cells(text[:end], separator)
-    untrusted.judge_columns(source.name, len(names))
+    untrusted.judge_columns(source.name, len(names), names)
     headless = bool(names) and all(map(_is_number, names))
     if headless and not given:
         raise HeadlessError(source.name, int(lines[0]), len(names))

@@ -8,7 +8,7 @@ the values afterwards is ours, and a defect there keeps its traceback.
 
 import contextlib
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar, cast
 
 from dmpcli.errors import DmpError, InputError
@@ -23,6 +23,9 @@ LARGEST_JSON = 32 * MIB
 
 MOST_COLUMNS = 10_000
 """Of a table; the widest exports of motion capture have some thousands."""
+
+LONGEST_NAME = 400
+"""Characters of a column's name."""
 
 LARGEST_TABLE, INFLATION = 384 * MIB, 16
 """Bytes that a table may take in memory, and times its file's own size: the larger of the two."""
@@ -91,8 +94,16 @@ def judge_size(name: str, size: int, largest: int, what: str) -> None:
         )
 
 
-def judge_columns(name: str, count: int) -> None:
-    """Refuse a table of more columns than anybody means.
+def judge_columns(name: str, count: int, names: Iterable[str] = ()) -> None:
+    """Refuse a table of more columns, or longer names of them, than anybody means.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    count : int
+    names : iterable of str
+        Of the columns.
 
     Raises
     ------
@@ -102,6 +113,12 @@ def judge_columns(name: str, count: int) -> None:
         raise InputError(
             f"{name}: has {count:,} columns, more than the {MOST_COLUMNS:,} that are read; leave "
             "out what is not needed"
+        )
+    long = next((column for column in names if len(column) > LONGEST_NAME), None)
+    if long is not None:
+        raise InputError(
+            f"{name}: column {long[:40]!r}... has a name of {len(long):,} characters, more than "
+            f"{LONGEST_NAME}; rename it"
         )
 
 

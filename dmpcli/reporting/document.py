@@ -8,6 +8,7 @@ from typing import TextIO
 
 from rich.table import Table
 
+from dmpcli.errors import printable
 from dmpcli.records import tolerance_mark
 from dmpcli.records.dataset import BatchFolder
 from dmpcli.records.learning_record import Lesson
@@ -130,7 +131,7 @@ def document(parts: Sequence[DocumentPart], surface: Row | None = None) -> Row:
 def as_json(report: Row) -> bytes:
     """Return the document as a JSON file."""
     text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
-    return f"{text}\n".encode()
+    return f"{printable(text)}\n".encode()
 
 
 WAVES = ["stroke", "role", "wave", "height_mm", "from_t_s", "to_t_s", "from_v_mm", "to_v_mm"]

@@ -1,6 +1,7 @@
 """What a file is: schema, columns, units, ranges, provenance; and what a foreign one could be."""
 
 import json
+import math
 import textwrap
 import tomllib
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 from rich.table import Table
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError, counted
+from dmpcli.errors import InputError, counted, printable
 from dmpcli.records import (
     json_files,
     layouts,
@@ -79,7 +80,17 @@ def inspected(source: Source) -> Row:
 def as_json(found: Row) -> bytes:
     """Return the description as a JSON file."""
     document = {"schema": NAME, "version": VERSION} | {"found": found}
-    return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    text = json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False)
+    return (printable(text) + "\n").encode()
+
+
+def _finite(value: Any) -> Any:
+    """Return a value for JSON, which has no word for what is not finite."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def as_text(found: Row, width: int) -> str:
@@ -93,7 +104,7 @@ def as_text(found: Row, width: int) -> str:
         lines += textwrap.wrap(tolerance_mark.text(found["file"], found["mark"]), width)
     said = {key: value for key, value in found.get("provenance", {}).items() if value}
     said |= {"sha256": found["sha256"]} | found.get("content", {})
-    wide = max(len(key) for key in said)
+    wide = min(max(len(key) for key in said), _WIDEST)
     for key, value in said.items():
         text, indent = f"{key:<{wide}}  {_flat(value)}", " " * (wide + 2)
         lines += textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
@@ -328,6 +339,13 @@ def _extent(found: Row) -> str:
     return text
 
 
+_WIDEST = 40
+"""Characters of a key that values are indented by: a longer one would leave them no room."""
+
+LISTED = 500
+"""Columns that the description for people lists; the other form has all."""
+
+
 def _columns(columns: Sequence[Row]) -> Table:
     table = Table(box=None, pad_edge=False)
     for title, justify in (
@@ -339,7 +357,7 @@ def _columns(columns: Sequence[Row]) -> Table:
         ("meaning", "left"),
     ):
         table.add_column(title, justify=justify)  # type: ignore[arg-type]
-    for column in columns:
+    for column in columns[:LISTED]:
         table.add_row(
             column["name"],
             column.get("unit", ""),
@@ -347,6 +365,8 @@ def _columns(columns: Sequence[Row]) -> Table:
             "-" if column["text"] else str(column["missing"]),
             column.get("meaning", ""),
         )
+    if len(columns) > LISTED:
+        table.add_row(f"and {len(columns) - LISTED} more", "", "", "", "", "")
     return table
 
 

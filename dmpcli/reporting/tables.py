@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from dmpcli.errors import printable
 from dmpcli.reporting.stroke_measures import Row
 
 _NOTHING = "-"
@@ -265,4 +266,5 @@ def plain(items: Sequence[Table | str], width: int) -> str:
             if title:
                 console.print(title, highlight=False, markup=False)
         console.print(item, highlight=False, markup=False)
-    return "".join(f"{line.rstrip()}\n" for line in sink.getvalue().splitlines())
+    lines = printable(sink.getvalue()).removesuffix("\n").split("\n")
+    return "".join(f"{line.rstrip()}\n" for line in lines)

@@ -23,6 +23,9 @@ Box = Annotated[
 ]
 """Smallest and largest x, y and z, mm."""
 
+WIDEST = (-1e6, 1e6) * 3
+"""A box that no arm leaves."""
+
 XYZ = "X Y Z"
 CORNERS = "XMIN XMAX YMIN YMAX ZMIN ZMAX"
 

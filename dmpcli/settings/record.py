@@ -11,6 +11,7 @@ from dmpcli.settings.ranges import CORNERS, XYZ, Box, Three
 
 if TYPE_CHECKING:
     from dmpcli.admittance.model import AdmittanceLaw, Bounds
+    from dmpcli.arrays import Floats
 
 # Wide enough for any tool, and no product of two of them overflows.
 Coefficient = Annotated[float, Ge(-1e9), Le(1e9)]
@@ -18,6 +19,9 @@ Six = tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient, Coe
 Positive = Annotated[float, Ge(1e-6), Le(1e6)]
 NotNegative = Annotated[float, Ge(0), Le(1e6)]
 _LIGHTEST = 1e-9
+
+ROOM = 500.0
+"""mm to each side of the start: more than a hand draws, and less than a runaway arm has."""
 
 TUTOR = ("seed", "reference", "start", "goal", "wave_height", "periods")
 """Settings of the mock's hand, which mean nothing where a person draws."""
@@ -65,7 +69,12 @@ class RecordSettings(Settings):
         Option("What the tool file may miss of the reading at rest; torque at 0.1 m.", "N"),
     ] = 1.5
     workspace: Annotated[
-        Box | None, Option("Box to stay in, mm.", metavar=CORNERS, unset="none")
+        Box | None,
+        Option(
+            "Box to stay in, mm; or none.",
+            metavar=CORNERS,
+            unset=f"{ROOM:g} mm about the start",
+        ),
     ] = None
 
     # The recording.
@@ -123,6 +132,13 @@ class RecordSettings(Settings):
             np.array(self.stiffness),
             1.0 / self.control_rate,
         )
+
+    def room(self, start: "Floats") -> Box:
+        """Return the workspace of a recording that begins at a point, shape (3,), mm."""
+        if self.workspace is not None:
+            return self.workspace
+        low, high = (start - ROOM).tolist(), (start + ROOM).tolist()
+        return (low[0], high[0], low[1], high[1], low[2], high[2])
 
     @property
     def coasting(self) -> float:

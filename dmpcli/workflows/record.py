@@ -18,7 +18,7 @@ from dmpcli.records import tool as tool_file
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import DEMONSTRATION
-from dmpcli.settings.record import TUTOR, RecordSettings, check
+from dmpcli.settings.record import ROOM, TUTOR, RecordSettings, check
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN
 from dmpcli.simulation.reference_strokes import Reference
@@ -132,6 +132,8 @@ def record(
             warn,
             lock.shared,
         )
+        if settings.workspace is None:
+            tell(f"stays within {ROOM:g} mm of the start in x, y and z; --workspace says otherwise")
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         with stopping.outranking(lambda: recorder.stop_outcome):
             try:

@@ -227,6 +227,23 @@ def test_poses_taken_before_a_failure_are_kept(tmp_path):
     assert 2 <= len(taken) < 6
 
 
+@pytest.mark.parametrize("save", [True, False])
+def test_poses_of_real_instruments_are_kept_though_nobody_asked(save, tmp_path, monkeypatch):
+    from dmpcli.control import workcell
+    from dmpcli.instruments import clock
+
+    monkeypatch.setattr(workcell, "repeatable", lambda _: False)
+    monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
+    monkeypatch.setattr("dmpcli.control.watchdog.watched", lambda robot: robot)
+    out, silent = tmp_path / "tool.json", ["--sensor", "mock:?silent_at=20"]
+    asked = ["--save", tmp_path / "poses.parquet"] if save else []
+    result = calibrate("-o", out, *asked, *silent, expect=4)
+    kept = tmp_path / ("poses.parquet" if save else "tool.json.poses.parquet")
+    assert 2 <= len(static_poses.decode(read(kept))[0]) < 6
+    assert ("poses kept in" in result.stderr) is not save
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 @pytest.mark.slow
 def test_by_hand_enter_takes_a_pose_and_one_orientation_is_not_enough(tmp_path):
     options = ["--by-hand", "--dwell", 0.2, "--save", "p.parquet"]
@@ -243,14 +260,15 @@ def test_by_hand_enter_takes_a_pose_and_one_orientation_is_not_enough(tmp_path):
 
 
 @pytest.mark.slow
-def test_by_hand_a_refused_set_that_is_not_kept_is_told_to_be_lost(tmp_path):
+def test_by_hand_a_refused_set_is_kept_though_nobody_asked(tmp_path):
     with Terminal("calibrate", "-o", "tool.json", "--by-hand", "--dwell", 0.2, cwd=tmp_path) as one:
         one.wait_for("Enter takes the pose, q and Enter ends")
         one.type()
         one.wait_for("pose 1 taken")
         one.type("q")
         assert one.end() == 3
-    assert "; 1 pose not kept: --save POSES keeps them" in one.said
+    assert "1 pose kept in tool.json.poses.parquet: calibrate --from reads them" in one.said
+    assert len(static_poses.decode(read(tmp_path / "tool.json.poses.parquet"))[0]) == 1
 
 
 def interrupted(folder, patience):

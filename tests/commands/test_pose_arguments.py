@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.commands.pose_arguments import POSE_OPTIONS, joined
+from dmpcli.commands.pose_arguments import POSE_OPTIONS, WORKSPACE, joined
+from dmpcli.settings.ranges import WIDEST
 
 SIX = ["1", "-2.5", "3e1", "-.1", "0", "nan"]
 
@@ -29,6 +30,10 @@ def test_six_numbers_become_one_value(option):
         (["--initial", "1", "2", "-o", "p"], ["--initial=1 2", "-o", "p"]),
         (["--initial", *SIX, "7"], [f"--initial={' '.join(SIX)}", "7"]),
         (["--", "--initial", *SIX], ["--", "--initial", *SIX]),
+        (["--workspace", "none", "-q"], ["--workspace", *map(str, WIDEST), "-q"]),
+        (["--workspace=none", "none"], ["--workspace", *map(str, WIDEST), "none"]),
+        (["--workspace", *SIX], ["--workspace", *SIX]),
+        (["--workspace"], ["--workspace"]),
     ],
 )
 def test_files_short_poses_and_the_end_of_options(words, expected):
@@ -37,5 +42,6 @@ def test_files_short_poses_and_the_end_of_options(words, expected):
 
 @given(st.lists(st.text()))
 def test_words_without_a_pose_option_pass_unchanged(words):
-    kept = [word for word in words if word.partition("=")[0] not in POSE_OPTIONS]
+    options = (*POSE_OPTIONS, WORKSPACE)
+    kept = [word for word in words if word.partition("=")[0] not in options]
     assert joined(kept) == kept

@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 
 from dmpcli import cli
 from dmpcli.control.workcell import parse
+from dmpcli.simulation.elite_server.lab_server import loopback
 from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.simulation.elite_server.virtual_fakes import Client
 
@@ -202,3 +203,30 @@ def test_a_sensor_port_that_is_taken_is_refused():
         done = refused("simulate", *FREE_PORTS, "--sensor-port", port)
     assert done.exit_code == 4
     assert f"--sensor-port {port}" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("host", "alone"),
+    [
+        ("127.0.0.1", True),
+        ("127.0.1.1", True),
+        ("localhost", True),
+        ("::1", True),
+        ("0.0.0.0", False),
+        ("", False),
+        ("192.168.0.7", False),
+        ("lab.example", False),
+    ],
+)
+def test_what_is_bound_beyond_loopback_is_known(host, alone):
+    assert loopback(host) is alone
+
+
+@pytest.mark.slow
+def test_a_bind_beyond_loopback_is_warned_of():
+    with Lab("-q", "--host", "0.0.0.0") as lab:
+        assert lab.sensor.startswith("netft://0.0.0.0:")
+    assert "--host 0.0.0.0: whoever reaches this computer there can move" in lab.told
+    with Lab("-q") as lab:
+        pass
+    assert lab.told == ""

@@ -8,6 +8,7 @@ from dmpcli.control.drag_loop import Recorder
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
+from dmpcli.settings.ranges import WIDEST
 from dmpcli.simulation.mock import PEN
 from tests.control.drag_fakes import FakeServo, QueueServo, drag_settings
 from tests.control.fake_sensors import StreamingSensor
@@ -123,7 +124,7 @@ def test_a_queue_gets_the_set_points_that_it_is_owed_and_no_other_arm_does(kind)
             # Once a second, by more than a period.
             super().sleep_until(t + (0.025 if 0.01 < t % 1.0 < 0.03 else 0.0))
 
-    recorder, sensor, servo = bench(longest=20.0, clock=Oversleeping(), kind=kind)
+    recorder, sensor, servo = bench(longest=20.0, clock=Oversleeping(), kind=kind, workspace=WIDEST)
     sensor.wrench = lambda t: PULL
     assert recorder.run().reason == "duration"
     assert recorder.timing.missed >= 19
@@ -560,3 +561,19 @@ def test_more_force_or_torque_than_the_tool_may_meet_stops(wrench, words):
     assert isinstance(ending.failure, RefusedError)
     assert words in ending.reason
     assert servo.sent[-1][0] <= 1.02
+
+
+@pytest.mark.parametrize("workspace", [None, (-50.0, 50.0, -900.0, 900.0, -900.0, 900.0), WIDEST])
+def test_an_arm_that_runs_away_is_held_in_a_room_about_its_start(workspace):
+    """Whatever pulls it, for as long as it likes: a bias that nobody has noticed, for one."""
+    recorder, sensor, servo = bench(longest=40.0, workspace=workspace)
+    servo.position = np.array([700.0, 0.0, 0.0]) if workspace is None else np.zeros(3)
+    begin = servo.position
+    sensor.wrench = lambda t: PULL
+    ending = recorder.run()
+    away = float(np.abs(servo.position - begin).max())
+    if workspace == WIDEST:
+        assert (ending.reason, away > 600.0) == ("duration", True)
+    else:
+        assert "leaves the workspace" in ending.reason
+        assert away <= (500.0 if workspace is None else 50.0)

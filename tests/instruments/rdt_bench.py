@@ -38,7 +38,9 @@ def running_box(read=lambda t: WRENCH, faults=None, **settings):
 @contextlib.contextmanager
 def sensor_at(box, **options):
     ports = {"http": str(box.http_port), "tcp": str(box.tcp_port)} if box.settings.pages else {}
-    address = Address("sensor", "netft", "127.0.0.1", box.rdt_port, {**ports, **options})
+    # These boxes read one and the same wrench, unless a test says another.
+    given = {"frozen": "0", **ports, **options}
+    address = Address("sensor", "netft", "127.0.0.1", box.rdt_port, given)
     sensor = make(address, MonotonicClock())
     try:
         yield sensor

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.instruments.netft import dialects, protocol
+from dmpcli.instruments.netft.box_watch import BoxWatch
 from dmpcli.instruments.netft.dialects import Dialect
 from dmpcli.instruments.netft.http_client import Box, NoAnswerError, resolve
 from dmpcli.instruments.netft.options import ONROBOT_SCALE, NetFtOptions
@@ -70,6 +71,7 @@ class NetFtSensor:
         self._mailbox: UdpReceiver | None = None
         self.box: BoxInfo | None = None
         self.stream: Stream | None = None
+        self._watch: BoxWatch | None = None
 
     def open(self) -> SensorInfo:
         """Ask the box what it is.
@@ -144,7 +146,9 @@ class NetFtSensor:
             opened.dialect.family,
             told or rate,
             self._clock.now(),
+            self._options.frozen,
         )
+        self._begin_watch(opened.pages)
 
     def poll(self) -> list[Sample]:
         """Return the samples since the last call, oldest first; never waits.
@@ -162,14 +166,46 @@ class NetFtSensor:
             stream.fault = f"{mailbox.dropped} datagrams came and were not read in time"
         samples = stream.take(letters)
         stream.listen(self._clock.now())
+        if stream.fault is None and self._watch is not None:
+            stream.fault = self._watch.fault
         unhealthy = bool(samples) and not samples[-1].healthy  # tells its fault itself
         if stream.fault is not None and not unhealthy:
             raise self._failed(f"{stream.fault}, stopped")
         return samples
 
     def close(self) -> None:
-        """Stop the stream; may be called twice."""
-        self._end()
+        """Stop the stream; may be called twice.
+
+        Raises
+        ------
+        InstrumentError
+            The box was set otherwise while it streamed, and no poll has told it yet.
+        """
+        stream, watch = self.stream, self._watch
+        try:
+            self._end()
+        finally:
+            self._watch = None
+            if watch is not None:
+                watch.end()
+        if stream is not None and stream.fault is None and watch is not None and watch.fault:
+            raise self._failed(f"{watch.fault}; what was measured meanwhile is in doubt")
+
+    def _begin_watch(self, pages: Box | None) -> None:
+        """Read how the box is set, and look from now on whether it stays so."""
+        if self._watch is not None:
+            self._watch.end()
+            self._watch = None
+        if pages is None or self._options.watch == 0.0:
+            return
+        try:
+            before = pages.info(_PAGES)
+        except (NoAnswerError, ValueError) as error:
+            raise self._failed(f"could not be set up: {error}") from None
+        given, opened = self._options.scale is not None, self._opened
+        if opened is not None and not given and _differ(before, opened):
+            raise self._failed("its scale was changed while it was set up; try again")
+        self._watch = BoxWatch(pages, before, self._options.watch)
 
     def _ask(self, box: Box) -> tuple[BoxInfo, Box | None]:
         """Read what the box says of itself, where it has pages; or its scale alone."""
@@ -307,6 +343,10 @@ class NetFtSensor:
 
     def _failed(self, what: str) -> InstrumentError:
         return InstrumentError(f"sensor netft://{self._host}: {what}")
+
+
+def _differ(box: BoxInfo, opened: _Opened) -> bool:
+    return bool((box.scale.per_count != opened.per_count).any())
 
 
 def _near(has: float | None, rate: float) -> bool:

@@ -22,6 +22,11 @@ filter    whole number              low-pass of the box: ATI 0 to 12, OnRobot 0 
                                     is none
 bias      yes | no                  make the present reading zero, in the box; a          no
                                     calibration made before is then wrong
+frozen    whole number              so many readings in a row, alike in all six counts,   25
+                                    are a sensor that has frozen; 0: no matter how many
+watch     s                         how often scale, units and bias of the box are read   0.5
+                                    from its pages and compared, and once at the end;
+                                    0: never
 ========  ========================  ====================================================  =========
 """
 
@@ -38,6 +43,9 @@ from dmpcli.instruments.options import Options as Query
 
 ONROBOT_SCALE = Scale(10_000.0, 100_000.0, "N", "N-m")
 """By OnRobot's own UDP example; its boxes have no page that tells."""
+
+FROZEN, WATCH = 25, 0.5
+"""Noise makes two readings alike in all six counts a rarity; a changed bias moves an arm."""
 
 _FORCES = ("lbf", "N", "klbf", "kN", "kgf")
 _TORQUES = ("lbf-in", "lbf-ft", "N-m", "N-mm", "kgf-cm", "kN-m")
@@ -59,6 +67,9 @@ class NetFtOptions:
         None: the box is asked.
     keep_rate, buffered, bias : bool
     filter : int or None
+    frozen : int
+    watch : float
+        s.
     """
 
     dialect: str | None = None
@@ -70,6 +81,8 @@ class NetFtOptions:
     buffered: bool = False
     bias: bool = False
     filter: int | None = None
+    frozen: int = FROZEN
+    watch: float = WATCH
 
 
 def read(address: Address) -> NetFtOptions:
@@ -99,6 +112,8 @@ def read(address: Address) -> NetFtOptions:
         buffered=given.flag("buffered", default=False),
         bias=given.flag("bias", default=False),
         filter=None if low_pass < 0 else low_pass,
+        frozen=given.whole("frozen", FROZEN, 0, 1_000_000),
+        watch=given.number("watch", WATCH, 0.0, 60.0, "s"),
     )
     given.done()
     if onrobot and asked.keep_rate:

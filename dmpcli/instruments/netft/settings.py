@@ -25,7 +25,7 @@ CALIBRATION_SIZE = _CALIBRATION.size
 
 _USED = re.compile(
     "prodname|cfgnam|cfgcpf|cfgcpt|scfgfu|scfgtu|cfgmr|cfgcalsel|comrdte|comrdtrate|comrdtbsiz|"
-    "runrate|setrate|setuserfilter|calcpf|calcpt|calsn"
+    "runrate|setrate|setuserfilter|setbias|calcpf|calcpt|calsn"
 )
 """The fields that are read; each may stand in a page once."""
 
@@ -95,6 +95,8 @@ class BoxInfo:
         Number of its low-pass filter, see `FILTERS`.
     serial : str
         Serial number of the calibrated transducer; empty where it does not say.
+    bias : tuple of float, or None
+        What it takes off its readings, counts per axis; None where it does not say.
     """
 
     product: str
@@ -107,6 +109,7 @@ class BoxInfo:
     records: int = 1
     low_pass: int | None = None
     serial: str = ""
+    bias: tuple[float, ...] | None = None
 
 
 def calibration_page(api: bytes) -> str:
@@ -162,6 +165,7 @@ def read_pages(api: bytes, calibration: bytes | None = None) -> BoxInfo:
         records=1 if records is None else max(int(records), 1),
         low_pass=None if low_pass is None else int(low_pass),
         serial=more.get("calsn", ""),
+        bias=_bias(fields),
     )
 
 
@@ -219,6 +223,13 @@ def _number(fields: dict[str, str], name: str) -> float | None:
 def _list(fields: dict[str, str], name: str) -> list[float]:
     parts = [part for part in fields.get(name, "").split(";") if part.strip()]
     return [_number({name: part}, name) or 0.0 for part in parts]
+
+
+def _bias(fields: dict[str, str]) -> tuple[float, ...] | None:
+    try:
+        return tuple(_list(fields, "setbias")) or None
+    except ValueError:
+        return None  # of another form; nothing else is made of it
 
 
 def _limit(fields: dict[str, str], scale: Scale) -> Floats | None:

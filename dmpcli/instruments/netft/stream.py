@@ -21,6 +21,9 @@ from dmpcli.instruments.protocols import Sample
 SILENCE = 0.1
 """s without a believable record, after which the stream counts as dead."""
 
+ONE_LOST = 2.5
+"""Periods that pass at most where one record is lost."""
+
 MALFORMED = 10
 """So many senseless datagrams in a row are a fault."""
 
@@ -64,6 +67,8 @@ class Stream:
         Hz.
     heard : float
         When the last record that was taken arrived, s; at first, since when it is waited for.
+    frozen : int
+        So many records in a row, alike in all six counts, are a fault; 0 is no matter how many.
 
     Attributes
     ----------
@@ -79,12 +84,15 @@ class Stream:
     family: Family
     rate: float
     heard: float
+    frozen: int = 0
     sequence: Sequence = field(init=False)
     tally: LossCounter = field(default_factory=LossCounter)
     fault: str | None = None
     _newest: float = -math.inf
     _senseless: int = 0
     _dropped: str = ""
+    _counts: bytes = b""
+    _alike: int = 0
 
     def __post_init__(self) -> None:
         """Begin to count: no stream loses more at once than it sends in a second."""
@@ -120,7 +128,8 @@ class Stream:
         now : float
             s, on the clock of the letters.
         """
-        if self.fault is not None or now - self.heard <= SILENCE:
+        # One record that the network loses is no silence, however slow the stream.
+        if self.fault is not None or now - self.heard <= max(SILENCE, ONE_LOST / self.rate):
             return
         why = self._dropped or "another client may have taken the stream, or check cable and power"
         self.fault = f"silent for {now - self.heard:.2f} s; {why}"
@@ -159,6 +168,8 @@ class Stream:
                 samples.append(Sample(self._newest, rdt_sequence, wrench, not reason, lost, reason))
                 if reason:
                     self.fault = f"sample {rdt_sequence}: {reason}"
+                else:
+                    self._compare(np.asarray(counts).tobytes())
             elif verdict is Verdict.BACKWARD:
                 self.fault = f"record {rdt_sequence}: {verdict.value}"
             elif verdict is Verdict.JUMP:
@@ -169,6 +180,16 @@ class Stream:
             if self.fault is not None:
                 return
             age -= 1.0 / self.rate
+
+    def _compare(self, counts: bytes) -> None:
+        """Make readings that never change a fault: a live sensor's noise changes them."""
+        self._alike = self._alike + 1 if counts == self._counts else 1
+        self._counts = counts
+        if self.frozen and self._alike >= self.frozen:
+            self.fault = (
+                f"{self._alike} readings in a row are alike in all six counts, though their "
+                "numbers go on: the sensor has frozen; check its cable, or give its URL frozen=0"
+            )
 
     def _unhealthy(self, status: int, wrench: Floats) -> str:
         """Say why a reading must not be believed; empty where it may."""

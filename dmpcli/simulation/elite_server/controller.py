@@ -29,6 +29,19 @@ STOP, PAUSE, ESTOP, PLAY, ERROR, COLLISION = range(6)
 TEACH, AUTO, REMOTE = range(3)
 """What getRobotMode answers; ``AUTO`` is the mode that the maker calls play."""
 
+# What the maker's clients ask before all else: a collaborative arm (62), an EC66 (6), joint
+# coordinates (0), teaching by single steps (0), its own tool and frame, half the speed.
+_IDENTITY: dict[str, Callable[[Params], Any]] = {
+    "getRobotType": lambda _: 62,
+    "getRobotSubtype": lambda _: 6,
+    "getCurrentCoord": lambda _: 0,
+    "getCycleMode": lambda _: 0,
+    "getToolNumber": lambda _: 1,
+    "getAutoRunToolNumber": lambda _: 1,
+    "getUserNumber": lambda _: 0,
+    "getSpeed": lambda _: 50.0,
+}
+
 # s: the state says emergency stop only so long; get_estop_status says it for as long as it lasts.
 _BRIEF = 0.5
 # rad/s²: of moves at 100 % acceleration, full speed within about half a second.
@@ -94,7 +107,7 @@ class SimulatedController:
             "positiveKinematic": self._forward,
             "get_transparent_transmission_state": lambda _: int(self._transmission is not None),
             "getSoftVersion": lambda _: "virtual",
-        }
+        } | _IDENTITY
         deeds: dict[str, Callable[[Params], Any]] = {
             "set_servo_status": self._set_servo,
             "syncMotorStatus": self._synchronise,

@@ -1,6 +1,7 @@
 """The virtual lab on its ports: the sensor's box and the arm's controller, both on one physics."""
 
 import contextlib
+import ipaddress
 from dataclasses import dataclass
 
 from dmpcli.arrays import Floats
@@ -13,6 +14,16 @@ from dmpcli.simulation.netft_server.faults import BoxFaults
 from dmpcli.simulation.netft_server.settings import BoxSettings
 
 LOOPBACK = "127.0.0.1"
+
+
+def loopback(host: str) -> bool:
+    """Tell whether only this computer itself can reach what is bound to a host."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 @dataclass(frozen=True)

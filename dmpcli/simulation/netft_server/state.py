@@ -3,10 +3,12 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.instruments.netft.settings import Scale
 from dmpcli.instruments.netft.status import WARNING
 from dmpcli.simulation.netft_server.faults import BoxFaults
 from dmpcli.simulation.netft_server.settings import INTERNAL_RATE, BoxSettings, rounded_up
@@ -64,6 +66,11 @@ class BoxState:
     def set_rate(self, rate: int) -> None:
         """Set the RDT rate, Hz, rounded up to one that the box has; a stream keeps its own."""
         self.rate, self._true_rate = rounded_up(rate)
+
+    def set_scale(self, scale: Scale) -> None:
+        """Give the readings another scale, as another active configuration does."""
+        self.settings = replace(self.settings, scale=scale)
+        self._counts_per_unit = 1.0 / scale.per_count
 
     def set_bias(self, axis: int, counts: int) -> None:
         """Set what is subtracted from one axis, counts."""

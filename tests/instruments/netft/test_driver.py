@@ -1,6 +1,7 @@
 import contextlib
 import socket
 import threading
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import numpy as np
@@ -444,3 +445,66 @@ def fault(sensor):
 
     until(failed)
     return messages[0]
+
+
+@pytest.mark.parametrize("what", ["bias", "scale", "unit"])
+def test_a_box_that_is_set_otherwise_meanwhile_is_a_fault(what, box):
+    with sensor_at(box, watch="0.05") as sensor:
+        sensor.open()
+        sensor.start(100.0)
+        polled(sensor, 3)
+        if what == "bias":
+            box.set_bias(2, 5_000_000)
+        elif what == "scale":
+            box.settings = replace(box.settings, scale=Scale(1e6 + 1, 1e6, "N", "N-m"))
+        else:
+            box.settings = replace(box.settings, scale=Scale(1e6, 1e6, "lbf", "N-m"))
+        with pytest.raises(InstrumentError, match=r"was changed, from .* to .*, stopped"):
+            until(lambda: sensor.poll() is None)
+        sensor.close()
+
+
+def test_what_was_changed_at_the_last_moment_is_told_at_the_end(box):
+    with sensor_at(box, watch="60") as sensor:
+        sensor.open()
+        sensor.start(100.0)
+        polled(sensor, 3)
+        box.set_bias(0, 7)
+        with pytest.raises(
+            InstrumentError, match=r"its bias was changed, from 0 .* to 7 0 0 0 0 0"
+        ):
+            sensor.close()
+        sensor.close()
+
+
+def test_a_box_that_is_not_watched_may_be_set(box):
+    with sensor_at(box, watch="0") as sensor:
+        sensor.open()
+        sensor.start(100.0)
+        box.set_bias(0, 7)
+        polled(sensor, 20)
+
+
+def test_a_bias_of_our_own_making_is_what_it_is_compared_with(box):
+    with sensor_at(box, watch="0.05", bias="yes") as sensor:
+        sensor.open()
+        sensor.start(100.0)
+        polled(sensor, 30)
+        assert box.bias().any()
+
+
+def test_the_watch_writes_nothing(box):
+    before = box.bias().tolist(), box.rate, box.low_pass, box.records
+    with sensor_at(box, watch="0.05", rate="keep") as sensor:
+        sensor.open()
+        sensor.start(float(box.rate))
+        polled(sensor, 30)
+    assert (box.bias().tolist(), box.rate, box.low_pass, box.records) == before
+
+
+def test_a_frozen_sensor_is_a_fault(box):
+    with sensor_at(box, frozen="20") as sensor:
+        sensor.open()
+        sensor.start(100.0)
+        with pytest.raises(InstrumentError, match=r"20 readings in a row are alike.*, stopped"):
+            until(lambda: sensor.poll() is None)

@@ -248,3 +248,28 @@ def test_of_a_hundred_thousand_fuzzed_datagrams_no_wrong_one_is_believed_and_eve
     assert datagrams == 100_000
     assert healthy > 30_000  # the fuzz leaves something to believe
     assert faults > 1_000
+
+
+def test_readings_that_never_change_are_a_frozen_sensor():
+    s = stream()
+    s.frozen = 25
+    noisy = [letter(record(n, counts=(1, 2, 3, 4, 5, n % 2))) for n in range(1, 100)]
+    assert len(s.take(noisy)) == 99
+    samples = s.take([letter(record(n)) for n in range(100, 200)])
+    assert len(samples) == 25
+    assert "25 readings in a row are alike in all six counts" in s.fault
+    assert s.take([letter(record(200, counts=(9,) * 6))]) == []
+
+
+def test_where_nobody_asks_no_reading_is_too_much_like_the_last():
+    s = stream()
+    assert len(s.take([letter(record(n)) for n in range(1, 300)])) == 299
+    assert s.fault is None
+
+
+def test_one_changed_count_begins_the_counting_anew():
+    s = stream()
+    s.frozen = 10
+    for n in range(1, 100):
+        s.take([letter(record(n, counts=(0, 0, 0, 0, 0, n // 9)))])
+    assert s.fault is None

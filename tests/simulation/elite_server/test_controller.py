@@ -34,6 +34,19 @@ def test_it_stands_in_remote_mode_with_its_servos_off_and_not_synchronised():
     assert bench.call("get_transparent_transmission_state") == 0
 
 
+def test_what_the_makers_clients_ask_at_the_start_is_answered():
+    """As elirobots 0.0.7 asks, whose enumerations know these numbers; 3, 6 and 12 are arms."""
+    bench = Bench()
+    assert bench.call("getRobotType") == 62
+    assert bench.call("getRobotSubtype") == 6
+    for method in ("getCurrentCoord", "getCycleMode", "getToolNumber", "getUserNumber"):
+        assert bench.call(method) in range(8)
+    assert isinstance(bench.call("getSoftVersion"), str)
+    # The key may stand anywhere for what only reads.
+    bench.lab.controller.switch(0)
+    assert bench.call("getRobotSubtype") == 6
+
+
 def test_servos_go_on_only_once_the_encoders_are_synchronised():
     bench = Bench()
     assert bench.call("set_servo_status", status=1) is False
