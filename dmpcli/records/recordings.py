@@ -12,6 +12,7 @@ from dmpcli.arrays import Floats, Integers
 from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError, counted
 from dmpcli.records import (
+    episodes,
     layouts,
     motive,
     plausibility,
@@ -145,6 +146,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     given = layout or Layout()
     reading = _Reading(*_table(source, given))
     reading.told += reading.table.remarks
+    reading.table = episodes.chosen(reading.table, given.episode, _times(reading))
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
@@ -202,6 +204,12 @@ def _headless(error: HeadlessError, commented: list[str] | None) -> str:
         f"line {error.line} holds {counted(error.count, 'number')}, not names of columns; name the "
         f"columns in order, as {how} does"
     )
+
+
+def _times(reading: _Reading) -> list[str]:
+    """Names of the columns that time is read from."""
+    named = [layouts.found(reading.layout, reading.names, "t")] if reading.names else []
+    return [column.name for column in named if column is not None]
 
 
 def _time(reading: _Reading) -> tuple[Floats, str]:

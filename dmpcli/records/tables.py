@@ -16,7 +16,7 @@ import pyarrow as pa
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import columns, record
+from dmpcli.records import columns, list_columns, record
 from dmpcli.records.file_io import Source
 
 PARQUET_MAGIC = b"PAR1"
@@ -204,9 +204,10 @@ def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -
 
 def _parquet(source: Source) -> Table:
     table = record.parquet_table(source)
-    return Table(
-        source.name, {name: table.column(name).combine_chunks() for name in table.column_names}
-    )
+    columns: dict[str, Any] = {}
+    for name in table.column_names:
+        columns |= list_columns.expanded(name, table.column(name).combine_chunks())
+    return Table(source.name, columns)
 
 
 def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:

@@ -33,12 +33,7 @@ class ExportOptions(Settings):
     ] = None
     orientation: Annotated[
         tuple[float, float, float] | None,
-        Option(
-            "Of the tool, where the file says none.",
-            "rad",
-            metavar="RX RY RZ",
-            unset="none is made up",
-        ),
+        Option("Of the tool, rad, where the file says none.", metavar="RX RY RZ", unset="none"),
     ] = None
     rate: Annotated[
         float | None,
