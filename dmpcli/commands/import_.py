@@ -20,8 +20,8 @@ def command(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Tables (CSV, Parquet, TUM), SVG drawings, G-code, URScript, KRL, RAPID; - is "
-            "standard input.",
+            help="Tables (CSV, Parquet, TUM), MCAP files, folders of ROS 2 bags and of LeRobot "
+            "datasets, SVG drawings, G-code, URScript, KRL, RAPID; - is standard input.",
             show_default=False,
         ),
     ],

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from dmpcli.errors import InputError
+from dmpcli.formats import lerobot_dataset, mcap_file, ros_bag
 from dmpcli.records.file_io import Source
 
 _SUFFIXES = {
@@ -18,6 +20,30 @@ _SUFFIXES = {
     ".modx": "rapid",
 }
 _SVG = re.compile(rb"<(?:\w+:)?svg[\s>]")
+
+
+def kind_of_path(path: Path) -> str | None:
+    """Return the word of a kind that is not read whole: a folder or an MCAP file; else None.
+
+    Raises
+    ------
+    InputError
+        A folder of no kind that is read.
+    """
+    if path.is_dir():
+        if (path / lerobot_dataset.INFO).is_file():
+            return "lerobot"
+        if (path / ros_bag.METADATA).is_file():
+            return "ros2"
+        raise InputError(
+            f"{path}: is a folder without {ros_bag.METADATA} (ROS 2 bag) or "
+            f"{lerobot_dataset.INFO} (LeRobot); name a file of it"
+        )
+    try:
+        with path.open("rb") as stream:
+            return "mcap" if stream.read(len(mcap_file.MAGIC)) == mcap_file.MAGIC else None
+    except OSError:
+        return None  # the reader of whole files says why
 
 
 def kind_of(source: Source) -> str:

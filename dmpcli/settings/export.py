@@ -18,6 +18,9 @@ WORDS = (
     "urscript",
     "krl",
     "rapid",
+    "mcap",
+    "ros2",
+    "lerobot",
 )
 
 
@@ -66,4 +69,7 @@ class ExportOptions(Settings):
     tool: Annotated[
         Path | None,
         Option("Tool file: where the TCP is on the flange, and its weight.", unset="none"),
+    ] = None
+    task: Annotated[
+        str | None, Option("LeRobot: what is done, in words.", unset="by the file's kind")
     ] = None

@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from dmpcli.settings.model import Option, Settings
 
-KINDS = ("table", "svg", "gcode", "urscript", "krl", "rapid")
+KINDS = ("table", "svg", "gcode", "urscript", "krl", "rapid", "mcap", "ros2", "lerobot")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """`import`: recordings, drawings and programs of others in, demonstrations out."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -75,19 +76,12 @@ def import_file(
     InputError
         It cannot be read, holds several strokes for one output, or an option says nothing of it.
     """
-    source = file_io.read(file)
-    kind = options.format or detect.kind_of(source)
-    _check_given(kind, given)
-    strokes = strokes_of(source, kind, options, form)
-    if form is not None and form.episode is not None and kind != TABLE:
-        known = [one.id for one in strokes]
-        strokes = [one for one in strokes if one.id == form.episode]
-        if not strokes:
-            raise InputError(f"--episode {form.episode}: {source.name} has {', '.join(known[:10])}")
+    kind, strokes, inputs = _read(file, options, form, given)
+    name = file_io.shown(file)
     if len(strokes) > 1 and ID not in output.name:
         names = ", ".join(one.id for one in strokes[:8])
         raise InputError(
-            f"{source.name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
+            f"{name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
             f"NAME, or put {ID} into the name of the output for a file of each"
         )
     said: dict[str, Any] = {"format": kind}
@@ -98,11 +92,75 @@ def import_file(
     for one in strokes:
         place = output
         if output.name != file_io.DASH:
-            name = output.name.replace(NAME, stem_of(file)).replace(ID, _safe(one.id))
-            place = output.with_name(name)
-        file_io.write(place, record.encode(demonstration(one, source, said)))
+            own = output.name.replace(NAME, stem_of(file)).replace(ID, _safe(one.id))
+            place = output.with_name(own)
+        file_io.write(place, record.encode(demonstration(one, inputs, said)))
         shown = file_io.shown(place, output=True)
         tell(f"{shown}: {counted(len(one), 'sample')}, {one.duration:.3f} s, from {kind}")
+
+
+def _read(
+    file: Path, options: ImportOptions, form: Layout | None, given: Mapping[str, Any]
+) -> tuple[str, list[MotionStroke], list[dict[str, str]]]:
+    """Return a file's kind, its strokes, and the entries of `Provenance.inputs`."""
+    episode = None if form is None else form.episode
+    kind = None if str(file) == file_io.DASH else detect.kind_of_path(file)
+    if kind is not None:
+        if options.format not in (None, kind):
+            raise InputError(f"--format {options.format}: {file} is {kind}; leave it out")
+        _check_given(kind, given)
+        stroke, told = _streamed(file, kind, form, episode)
+        for line in told:
+            tell(f"{file}: {line}")
+        return kind, [stroke], _hashes(file)
+    source = file_io.read(file)
+    kind = options.format or detect.kind_of(source)
+    if kind in _STREAMED:
+        raise InputError(f"--format {kind}: {source.name} is none")
+    _check_given(kind, given)
+    strokes = strokes_of(source, kind, options, form)
+    if episode is not None and kind != TABLE:
+        known = [one.id for one in strokes]
+        strokes = [one for one in strokes if one.id == episode]
+        if not strokes:
+            raise InputError(f"--episode {episode}: {source.name} has {', '.join(known[:10])}")
+    return kind, strokes, [input_of("recording", source)]
+
+
+_STREAMED = ("mcap", "ros2", "lerobot")
+
+
+def _streamed(
+    file: Path, kind: str, form: Layout | None, episode: str | None
+) -> tuple[MotionStroke, list[str]]:
+    """Read what is not read whole."""
+    body = None if form is None else form.body
+    if kind == "lerobot":
+        from dmpcli.formats import lerobot_dataset
+
+        if body is not None:
+            raise InputError("--body: says nothing of a lerobot dataset; leave it out")
+        return lerobot_dataset.read(file, episode)
+    if episode is not None:
+        raise InputError(f"--episode: says nothing of {kind}; --body chooses a topic or frame")
+    if kind == "mcap":
+        from dmpcli.formats import mcap_file
+
+        return mcap_file.read(file, str(file), body)
+    from dmpcli.formats import ros_bag
+
+    return ros_bag.read(file, body)
+
+
+def _hashes(path: Path) -> list[dict[str, str]]:
+    """Entries of `Provenance.inputs` of a file or of all files of a folder, in order."""
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    found = []
+    for file in files:
+        with file.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        found.append({"role": "recording", "sha256": digest})
+    return found
 
 
 _OPTIONS: dict[str, tuple[str, ...]] = {
@@ -112,12 +170,14 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
     "urscript": ("rate",),
     "krl": ("rate",),
     "rapid": ("rate",),
+    "mcap": (),
+    "ros2": (),
+    "lerobot": (),
 }
 _OF_TABLES = (
     "layout",
     "map_",
     "columns",
-    "body",
     "time_unit",
     "angle_unit",
     "rotation",
@@ -134,6 +194,7 @@ def _check_given(kind: str, given: Mapping[str, Any]) -> None:
     alone = [name for name in given if name in own]
     if kind != TABLE:
         alone += [name for name in given if name in _OF_TABLES]
+        alone += ["body"] if "body" in given and kind not in ("mcap", "ros2") else []
         alone += ["length_unit"] if "length_unit" in given and kind != "svg" else []
     if alone:
         flag = f"--{alone[0].rstrip('_').replace('_', '-')}"
@@ -216,7 +277,9 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     return replace(one, t=t, position=position, rotation=R)
 
 
-def demonstration(one: MotionStroke, source: Source, options: dict[str, Any]) -> Record:
+def demonstration(
+    one: MotionStroke, inputs: Sequence[dict[str, str]], options: dict[str, Any]
+) -> Record:
     """Return the record of a stroke that came in."""
     columns: dict[str, Any] = {"t": np.asarray(one.t, dtype=float)}
     columns |= dict(zip(POSITION, np.asarray(one.position, dtype=float).T, strict=True))
@@ -225,7 +288,7 @@ def demonstration(one: MotionStroke, source: Source, options: dict[str, Any]) ->
         columns |= dict(zip(EULER_ANGLES, angles.T, strict=True))
     if one.wrench is not None:
         columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
-    origin = Provenance("import", options, (input_of("recording", source),))
+    origin = Provenance("import", options, tuple(inputs))
     return Record(schemas.DEMONSTRATION, columns, origin)
 
 
