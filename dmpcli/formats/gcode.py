@@ -77,7 +77,7 @@ def _point(position: Floats) -> str:
     return " ".join(f"{n}{number(v, 4)}" for n, v in zip("XYZ", position.tolist(), strict=True))
 
 
-_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.ASCII)
 _COMMENT = re.compile(r"\(([^)]*)\)|;(.*)")
 _MOTIONS = {0: "G0", 1: "G1", 2: "G2", 3: "G3"}
 _HARMLESS = {4, 17, 20, 21, 40, 49, 54, 61, 61.1, 64, 80, 90, 91, 91.1, 94, 98, 99}

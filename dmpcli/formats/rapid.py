@@ -99,18 +99,18 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
 
 
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIST = re.compile(_N)
+_LIST = re.compile(_N, re.ASCII)
 _MOVE = re.compile(
     rf"MoveL\s+\[\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]\s*,[^;]*?\]\s*\]\s*,\s*"
     rf"(?:v({_N}|max)|\[\s*({_N})[^\]]*\])\s*(?:\\([VT])\s*:=\s*({_N}))?\s*,[^;]*;",
-    re.IGNORECASE,
+    re.ASCII | re.IGNORECASE,
 )
-_WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.IGNORECASE)
+_WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.ASCII | re.IGNORECASE)
 _HARMLESS = re.compile(
     r"(MODULE\s+\w+.*|ENDMODULE|(LOCAL\s+)?PROC\s+\w+\s*\(\s*\)|ENDPROC|"
     r"(LOCAL\s+)?(PERS|CONST|VAR|TASK)\s.*;|\w+\s*;|(ConfL|ConfJ|SingArea|AccSet)\b.*;|"
     r"\w+\s*:=\s*CTool\s*\(\s*\)\s*;|%%%|VERSION:.*|LANGUAGE:.*)",
-    re.IGNORECASE,
+    re.ASCII | re.IGNORECASE,
 )
 
 

@@ -13,11 +13,13 @@ OLD_NAMES = pytest.mark.filterwarnings("ignore:.* deprecated:DeprecationWarning"
 
 
 @OLD_NAMES
-@pytest.mark.parametrize("options", [ProgramOptions(), ProgramOptions(lift=0.0, lines=20)])
+@pytest.mark.parametrize("options", [ProgramOptions(), ProgramOptions(lift=0.0, lines=4)])
 def test_rapidchecker_parses_our_rapid(options):
     from rapidchecker.check import check_format
 
-    text = rapid.encode(motion(wave(), wave(name="b")), options, "wave").decode()
+    text = rapid.encode(
+        motion(wave(samples=5), wave(samples=4, name="b")), options, "wave"
+    ).decode()
     assert not check_format(text)
 
 
@@ -25,7 +27,7 @@ def test_rapidchecker_parses_our_rapid(options):
 def test_rapidchecker_would_tell_what_is_no_rapid():
     from rapidchecker.check import check_format
 
-    text = rapid.encode(motion(), ProgramOptions(), "wave").decode()
+    text = rapid.encode(motion(wave(samples=4)), ProgramOptions(), "wave").decode()
     assert check_format(text.replace("ENDPROC", "ENDFOR", 1))
 
 
