@@ -48,12 +48,16 @@ $(VENV)/installed: FORCE
 	@sh tools/set_up.sh "$(PYTHON)" "$(VENV)" "$(LOCK)" "$(OUT)"
 
 # Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
-# what they share is made once.
+# what they share is made once. Lint and types are looked at meanwhile: some tests wait in real time,
+# and mypy is one process.
 
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-test: $(VENV)/installed lint
-	$(PYTEST)
+test: $(VENV)/installed
+	@mkdir -p $(OUT)
+	@nice -n 5 $(MAKE) --no-print-directory lint > $(OUT)/lint.log 2>&1 & lint=$$!; \
+	    $(PYTEST); tests=$$?; wait $$lint; linted=$$?; \
+	    cat $(OUT)/lint.log; exit $$((tests | linted))
 
 test-quick: $(VENV)/installed
 	$(PYTEST) -m "not slow"
@@ -113,14 +117,9 @@ soak: $(VENV)/installed
 
 PEERS := $(OUT)/peers
 
-$(PEERS)/installed: benchmarks/peers/requirements.txt
-	$(PYTHON) -m venv $(PEERS)/venv
-	$(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< || \
-	    $(PEERS)/venv/bin/pip install --quiet --disable-pip-version-check -r $< \
-	        --extra-index-url https://download.pytorch.org/whl/cpu
-	touch $@
-
-peers: $(PEERS)/installed
+peers:
+	@sh tools/set_up.sh "$(PYTHON)" "$(PEERS)/venv" benchmarks/peers/requirements.txt "$(OUT)" open \
+	    https://download.pytorch.org/whl/cpu
 	$(PEERS)/venv/bin/python -W ignore -m benchmarks.peers > $(PEERS)/peers.md
 	cp $(PEERS)/peers.md docs/peers.md
 	@cat docs/peers.md

@@ -15,14 +15,10 @@ if TYPE_CHECKING:
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.plane import Plane
     from dmpcli.surfaces.sphere import Sphere
-    from dmpcli.workflows.library import (
-        fit,
-        generalize,
-        read,
-        read_surface,
-        wave_heights,
-        write,
-    )
+    from dmpcli.workflows.library import fit, generalize, read, read_surface, write
+    from dmpcli.workflows.report import Report
+    from dmpcli.workflows.reports import inspect, report, wave_heights
+    from dmpcli.workflows.runs import execute, record
     from dmpcli.workflows.values import Demonstration, Run, TrajectoryBatch
 
 _HOMES = {
@@ -37,13 +33,18 @@ _HOMES = {
     "Plane": "surfaces.plane",
     "Sphere": "surfaces.sphere",
     "Demonstration": "workflows.values",
+    "Report": "workflows.report",
     "Run": "workflows.values",
     "TrajectoryBatch": "workflows.values",
+    "execute": "workflows.runs",
     "fit": "workflows.library",
     "generalize": "workflows.library",
+    "inspect": "workflows.reports",
     "read": "workflows.library",
     "read_surface": "workflows.library",
-    "wave_heights": "workflows.library",
+    "record": "workflows.runs",
+    "report": "workflows.reports",
+    "wave_heights": "workflows.reports",
     "write": "workflows.library",
 }
 
@@ -56,16 +57,21 @@ __all__ = [
     "Mesh",
     "Plane",
     "RefusedError",
+    "Report",
     "Run",
     "Skill",
     "Sphere",
     "Trajectory",
     "TrajectoryBatch",
     "__version__",
+    "execute",
     "fit",
     "generalize",
+    "inspect",
     "read",
     "read_surface",
+    "record",
+    "report",
     "wave_heights",
     "write",
 ]

@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from dmpcli.commands.pose_arguments import joined
-from dmpcli.errors import DmpError
+from dmpcli.errors import DmpError, UnconfirmedStopError
 from dmpcli.version import __version__
 
 CONTEXT = {"help_option_names": ["-h", "--help"]}
@@ -57,6 +57,15 @@ class LazyCommand(TyperCommand):
         return typer.main.get_command(whole).make_context(info_name, args, parent, **extra)
 
 
+def _show_defect(error: DmpError) -> None:
+    """Show the traceback of a defect before what outranks it: an arm that may still move."""
+    defect = error.__cause__ if isinstance(error, UnconfirmedStopError) else None
+    if isinstance(defect, Exception) and not isinstance(defect, DmpError | typer.Exit):
+        import traceback
+
+        traceback.print_exception(defect)
+
+
 class Group(TyperGroup):
     """Turns a user's mistake into one message and its exit code; a defect keeps its traceback."""
 
@@ -73,6 +82,7 @@ class Group(TyperGroup):
         try:
             return super().invoke(ctx)
         except DmpError as error:
+            _show_defect(error)
             print(f"dmpcli: {error}", file=sys.stderr)  # noqa: T201
             sys.exit(error.exit_code)
         except BrokenPipeError:

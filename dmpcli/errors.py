@@ -31,6 +31,13 @@ class InstrumentError(DmpError):
     exit_code = 4
 
 
+class UnconfirmedStopError(InstrumentError):
+    """An arm that may still move (code 4); its text ends with that, and nothing outranks it.
+
+    Its cause, where that is a defect of ours, is shown with its traceback before.
+    """
+
+
 def counted(number: int, what: str) -> str:
     """Return a number of things in words: 1 pose, 2 poses."""
     return f"{number} {what}" + ("" if number == 1 else "s")

@@ -54,8 +54,7 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     callable
         Takes the number of steps done since the last call.
     """
-    ours = any(isinstance(handler, Terminal) for handler in LOG.handlers)
-    if not (ours and wanted() and sys.stderr.isatty()):
+    if not _watched():
         yield lambda _: None
         return
     from rich.console import Console
@@ -71,3 +70,21 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)
         yield lambda steps: bar.advance(task, steps)
+
+
+@contextlib.contextmanager
+def status(text: str) -> Iterator[None]:
+    """Show a line on the command line's terminal while something goes on; elsewhere nothing."""
+    if not _watched():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(text):
+        yield
+
+
+def _watched() -> bool:
+    """Tell whether a person sits before the command line's terminal, and wants to be told."""
+    ours = any(isinstance(handler, Terminal) for handler in LOG.handlers)
+    return ours and wanted() and sys.stderr.isatty()

@@ -1,6 +1,8 @@
 """Settings of all tests."""
 
 import functools
+import gc
+import sys
 
 import typer.testing
 from hypothesis import settings
@@ -15,6 +17,15 @@ FIRST = ("tests/pipeline", "tests/tools")
 
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
+
+
+def pytest_unconfigure():
+    """Let go of what tests keep for one another: a mesh's search tree must not outlive igl."""
+    for module in [m for name, m in sys.modules.items() if name.startswith("tests.")]:
+        for kept in vars(module).values():
+            if isinstance(kept, functools._lru_cache_wrapper):
+                kept.cache_clear()
+    gc.collect()
 
 
 # Typer's runner builds all commands anew for each call, which takes longer than most calls do.

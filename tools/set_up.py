@@ -1,9 +1,11 @@
-"""Make the environment that the Makefile's targets work in: ``set_up.py VENV LOCK OUT [bare]``.
+"""Make the environment that the Makefile's targets work in.
 
-It is made anew when Python, lock file or place is another than it was made with, or when it was
-never finished: what half an installation left cannot be told from what is whole. ``VENV/installed``
-says what it was made with and is written last. Whatever stands in the way is said in one line.
-A bare one holds the lock's packages without this project.
+``set_up.py VENV LOCK OUT [bare | open [INDEX]]``. It is made anew when Python, lock file or place
+is another than it was made with, or when it was never finished: what half an installation left
+cannot be told from what is whole. ``VENV/installed`` says what it was made with, written last.
+Whatever stands in the way is said in one line. A bare one holds the lock's packages without this
+project; an open one is bare and made from requirements, for which pip finds what they need, in
+INDEX too where the index at hand does not do.
 """
 
 import contextlib
@@ -50,7 +52,7 @@ class SetUpError(Exception):
     """What stands in the way, and what to do."""
 
 
-def main(venv: Path, lock: Path, out: Path, bare: bool) -> None:
+def main(venv: Path, lock: Path, out: Path, mode: str = "", index: str = "") -> None:
     """Make the environment, unless it is there and whole."""
     if sys.prefix != sys.base_prefix and Path(sys.prefix).resolve() == venv.resolve():
         # Called by the environment's own Python: one that is about to be made anew cannot do it.
@@ -61,7 +63,7 @@ def main(venv: Path, lock: Path, out: Path, bare: bool) -> None:
         "python": f"{sys.version} {sys.base_prefix}",
         "place": str(venv.resolve()),
         "lock": digest(lock),
-        "project": "" if bare else digest(ROOT / "pyproject.toml", *installed_files()),
+        "project": "" if mode else digest(ROOT / "pyproject.toml", *installed_files()),
     }
     with alone(venv):
         there = made_with(venv)
@@ -71,11 +73,8 @@ def main(venv: Path, lock: Path, out: Path, bare: bool) -> None:
         if there is None or {**there, "project": wanted["project"]} != wanted:
             fresh(venv)
             say(f"{NAME} into {venv}, from {lock.name}; about a minute")
-            # The lock names every package, so that nothing is left to resolve; what no wheel is
-            # there for would be compiled for minutes and fail in a compiler's words. Python writes
-            # its byte code of what is used when it is first used, in half the time.
-            pip(venv, "-r", str(lock), "--no-deps", "--only-binary", ":all:", "--no-compile")
-        if not bare:
+            packages(venv, lock, mode, index)
+        if not mode:
             project(venv)
         (venv / "installed").write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
 
@@ -176,6 +175,23 @@ def fresh(venv: Path) -> None:
         raise SetUpError(f"{NAME} makes no environment: {last_line(done)}")
 
 
+def packages(venv: Path, lock: Path, mode: str, index: str) -> None:
+    """Install what a lock or, in an open environment, requirements name."""
+    # Python writes its byte code of what is used when it is first used, in half the time.
+    words = ("-r", str(lock), "--no-compile")
+    if mode != "open":
+        # The lock names every package, so that nothing is left to resolve; what no wheel is there
+        # for would be compiled for minutes and fail in a compiler's words.
+        pip(venv, *words, "--no-deps", "--only-binary", ":all:")
+        return
+    try:
+        pip(venv, *words)
+    except SetUpError:
+        if not index:
+            raise
+        pip(venv, *words, "--extra-index-url", index)
+
+
 def project(venv: Path) -> None:
     """Install this project: as it lies here, or a copy where the folder can't be written."""
     more = ("--no-deps", "--no-build-isolation")
@@ -254,7 +270,7 @@ def say(text: str) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        main(*map(Path, sys.argv[1:4]), bare=sys.argv[4:] == ["bare"])
+        main(*map(Path, sys.argv[1:4]), *sys.argv[4:])
     except SetUpError as error:
         say(str(error))
         sys.exit(1)

@@ -112,7 +112,7 @@ def displace(
         back = law.release * period
         return Displacement(state.e - min(max(state.e, -back), back), 0.0, touched, absent)
     excess, speed, e = np.array([[force - law.setpoint], [state.speed], [state.e]])
-    speed, e = admittance.advance(law.model, excess, speed, e)
+    speed, e = admittance.advance(law.model, excess, speed, e)  # e(X) of eq. (10)
     if abs(e[0]) > law.clamp:
         return Displacement(float(np.copysign(law.clamp, e[0])), 0.0, touched, absent)
     return Displacement(float(e[0]), float(speed[0]), touched, absent)
@@ -170,5 +170,5 @@ def follow(filter_: Filter, state: Floats, e: float) -> Floats:
     -------
     array, shape (2,)
     """
-    new: Floats = filter_.transition @ state + filter_.response * e
+    new: Floats = filter_.transition @ state + filter_.response * e  # eq. (10)
     return new

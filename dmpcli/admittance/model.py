@@ -136,7 +136,7 @@ def acceleration(
     array, shape (..., n)
         a(k).
     """
-    return (force - law.damping * velocity - law.stiffness * displacement) / law.mass
+    return (force - law.damping * velocity - law.stiffness * displacement) / law.mass  # eq. (1)
 
 
 def advance(
@@ -155,8 +155,9 @@ def advance(
     tuple of array, shape (..., n)
         v(k) and x(k) - x0.
     """
-    velocity = acceleration(law, force, velocity, displacement) * law.period + velocity
-    return velocity, velocity * law.period + displacement
+    a = acceleration(law, force, velocity, displacement)  # eq. (1)
+    v = a * law.period + velocity  # eq. (2)
+    return v, v * law.period + displacement  # eq. (3)
 
 
 def move(
@@ -191,17 +192,15 @@ def move(
     if law.stiffness.any():
         displacement[:3] = pose.position - home.position
         displacement[3:] = log_one(pose.rotation @ home.rotation.T)
-    a = acceleration(law, wrench, pose.velocity, displacement)
+    a = acceleration(law, wrench, pose.velocity, displacement)  # eq. (1)
     if bounds is not None:
         a = _within(a, bounds.acceleration, bounds.turning_acceleration)
-    v = a * law.period + pose.velocity
+    v = a * law.period + pose.velocity  # eq. (2)
     if bounds is not None:
         v = _within(v, bounds.speed, bounds.turning)
-    return DragState(
-        v[:3] * law.period + pose.position,
-        exp_one(law.period * v[3:]) @ pose.rotation,
-        v,
-    )
+    x = v[:3] * law.period + pose.position  # eq. (3)
+    R = exp_one(law.period * v[3:]) @ pose.rotation  # eq. (3), of a rotation
+    return DragState(x, R, v)
 
 
 def brake(law: AdmittanceLaw, pose: DragState, bounds: Bounds) -> DragState:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.dmp.drawn_strokes import DrawnBlock, DrawnStroke, GeneralizeOptions
@@ -20,7 +19,7 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.dmp.tool_speed import LEAST_HELD, held
 from dmpcli.errors import InputError
 from dmpcli.kinematics.reachability import Reach
-from dmpcli.records import record, trajectory
+from dmpcli.records import file_io, record, trajectory
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Form, Provenance, Record
 from dmpcli.surfaces.surface import LEAVES, Status, Surface
@@ -291,18 +290,21 @@ def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:
     facts = drawn.provenance.facts | {FACT: outcome.fact()}
     drawn = replace(drawn, provenance=replace(drawn.provenance, facts=facts))
     file = Path(job.folder) / part.file
-    # Another machine may draw the same part: a name that nobody else has.
-    temporary = file.with_name(f".{file.name}.{uuid4().hex}.tmp")
+    temporary: Path | None = None
     try:
-        # Not flushed to the disk one by one: after a power cut a part can be drawn again, and the
-        # manifest tells its size.
-        record.store(drawn, str(temporary), job.form)
+        # Another machine may draw the same part: a name that nobody else has. Not flushed to the
+        # disk one by one: after a power cut a part can be drawn again, and the manifest tells its
+        # size.
+        temporary, stream = file_io.temporary_of(file)
+        with stream:
+            record.store(drawn, stream, job.form)
         size = temporary.stat().st_size
         temporary.replace(file)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise InputError(f"{file}: cannot be written: {reason}") from None
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
     return replace(outcome, rows=len(drawn.columns["t"]), size=size)

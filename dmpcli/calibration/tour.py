@@ -160,8 +160,8 @@ class Tour:
             ForceInput(self._sensing, self._change),
         )
         outcome = loop.run(self._interruption)
-        if outcome.failure is not None:
-            raise type(outcome.failure)(f"{where}: {outcome.reason}")
+        if (error := outcome.error(f"{where}: ")) is not None:
+            raise error
         if outcome.signal is not None:
             raise Interrupted(outcome.signal, outcome.reason)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dmpcli.commands.options import AllowMixed, Quiet, Realtime, Robot, Sensor
-from dmpcli.errors import InputError, RefusedError, counted
+from dmpcli.errors import InputError, RefusedError, UnconfirmedStopError, counted
 from dmpcli.messages import on_terminal
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.settings.options import with_options
@@ -68,7 +68,16 @@ def command(
             suffixes.check(name, kind)
             file_io.check_writable(name)
     request = CalibrationRequest(
-        output, tool, robot, sensor, by_hand, save, realtime, allow_mixed, force
+        output,
+        tool,
+        robot,
+        sensor,
+        by_hand,
+        save,
+        realtime,
+        allow_mixed,
+        force,
+        from_file is not None,
     )
     if from_file is None:
         _measure(settings, request)
@@ -89,6 +98,17 @@ class CalibrationRequest:
     realtime: bool
     allow_mixed: bool
     force: bool
+    from_file: bool
+
+    @property
+    def replaces(self) -> bool:
+        """Whether a file that appears meanwhile may be replaced: the same can be made again."""
+        from dmpcli.control import workcell
+
+        if self.from_file or self.force:
+            return True
+        addresses = workcell.check(self.robot, self.sensor, self.allow_mixed)
+        return workcell.repeatable(addresses)
 
 
 def _from_file(settings: "CalibrateSettings", request: CalibrationRequest, name: str) -> None:
@@ -136,6 +156,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         tell(bench.note)
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
+    moving: UnconfirmedStopError | None = None
     options = {"robot": workcell.in_provenance(request.robot), "by_hand": request.by_hand}
     options |= {"sensor": workcell.in_provenance(request.sensor), "realtime": realtime}
     try:
@@ -145,11 +166,20 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     except Interrupted as stop:
         warn(str(stop))
         raise typer.Exit(128 + stop.number) from None
+    except UnconfirmedStopError as error:
+        moving = error
+        raise
     finally:
         # What was measured is kept, whatever ended it.
         closing = guards.leave(bench.robot.close, bench.sensor.close)
         if taken and info is not None:
-            _save(taken, geometry, info, settings, request, source, options)
+            try:
+                _save(taken, geometry, info, settings, request, source, options)
+            except InputError as error:
+                if moving is None:
+                    raise
+                warn(str(error))  # an arm that may still move is told last
+                raise moving from None
     if closing is not None:
         raise closing
     sources = {} if source is None else {"tool": source}
@@ -223,9 +253,10 @@ def _save(
     options: dict[str, Any],
 ) -> None:
     from dmpcli.calibration import result
-    from dmpcli.records import file_io, static_poses
+    from dmpcli.records import static_poses
     from dmpcli.records import tool as tool_file
     from dmpcli.records.record import Provenance, input_of
+    from dmpcli.workflows.run_output import write_once
 
     if request.save is None:
         return
@@ -235,7 +266,7 @@ def _save(
     }
     inputs = () if source is None else (input_of("tool", source),)
     provenance = Provenance("calibrate", options | settings.as_options(), inputs, facts)
-    file_io.write(request.save, static_poses.encode(taken, provenance))
+    write_once(request.save, static_poses.encode(taken, provenance), request.replaces)
 
 
 def _conclude(
@@ -252,6 +283,7 @@ def _conclude(
     from dmpcli.messages import tell, wanted
     from dmpcli.records import file_io
     from dmpcli.records import tool as tool_file
+    from dmpcli.workflows.run_output import write_once
 
     found, remarks = result.identified(taken, geometry, settings.condition, settings.max_residual)
     calibration = tool_file.calibrated(
@@ -260,9 +292,8 @@ def _conclude(
         options | settings.as_options(),
         [{"role": role, "sha256": source.sha256} for role, source in sources.items()],
     )
-    file_io.write(
-        request.output, tool_file.encode(result.with_payload(geometry, found), calibration)
-    )
+    written = tool_file.encode(result.with_payload(geometry, found), calibration)
+    write_once(request.output, written, request.replaces)
     for remark in remarks:
         tell(remark)
     if wanted():

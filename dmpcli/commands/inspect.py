@@ -1,6 +1,5 @@
 """``dmpcli inspect``: what a file is."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,8 +28,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
-    from dmpcli.messages import tell
-    from dmpcli.records import file_io, mesh
+    from dmpcli.records import file_io
     from dmpcli.reporting import inspection
 
     if schema is not None:
@@ -38,12 +36,8 @@ def command(
         return
     if file is None:
         raise InputError("FILE is missing: name a file, or - for standard input")
-    if Path(file).is_dir() and (Path(file) / file_io.TABLE).is_file():
-        file = str(Path(file) / file_io.TABLE)
-    source = file_io.read(file)
-    waiting = mesh.waiting(source)
-    if waiting is not None:
-        tell(waiting)
-    found = inspection.inspected(source)
+    from dmpcli.workflows.inspect import inspect
+
+    found = inspect(file)
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
     file_io.say(text)

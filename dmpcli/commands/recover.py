@@ -29,6 +29,7 @@ def command(
     on_terminal(quiet)
     from dmpcli.records import file_io, record, suffixes
     from dmpcli.records import journal as journals
+    from dmpcli.workflows.run_output import write_once
 
     suffixes.check(output, suffixes.PARQUET)
     file_io.check_writable(output)
@@ -36,7 +37,7 @@ def command(
         raise InputError(f"{output}: exists; choose another name, or give --force")
     found = journals.read(file_io.read(journal, journal=True))
     whole = _record(found)
-    file_io.write(output, record.encode(whole))
+    write_once(output, record.encode(whole), replaces=force)
     tell(_summary(output, journal, found, whole))
 
 

@@ -14,16 +14,18 @@ Whatever ends a loop, the arm is stopped and the log is there.
 import signal
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Protocol
 
 from dmpcli.arrays import Floats
-from dmpcli.control import guards
+from dmpcli.control import guards, stopping
+from dmpcli.control.arrival import ANGLE, TOLERANCE
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.control.loop_timing import LoopTiming, undisturbed
 from dmpcli.control.settling import SettlingDetector
 from dmpcli.control.signals import Interruption
+from dmpcli.control.stopping import AT_REST, StopOutcome
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
 from dmpcli.settings.ranges import Box
@@ -50,12 +52,16 @@ class StopLimits:
         Distance of the actual pose from the set-points just sent, mm and rad.
     force, torque : float
         On the tool, N and N·m.
+    arrival, arrival_angle : float
+        Distance of the arm at rest from the set-point that it was led to last, mm and rad.
     """
 
     following_error: float
     following_angle: float
     force: float
     torque: float
+    arrival: float = TOLERANCE
+    arrival_angle: float = ANGLE
 
 
 class WrenchSource(Protocol):
@@ -108,20 +114,39 @@ class LoopOutcome:
     reason : str
         How a run ends that nothing stopped, why it was stopped, or what failed.
     failure : DmpError or None
-        What the command shall end with once all is kept.
+        What went wrong first.
     signal : int or None
         The signal that stopped it.
+    stop : StopOutcome
+        How the arm was left.
     """
 
     reason: str
     failure: DmpError | None = None
     signal: int | None = None
+    stop: StopOutcome = AT_REST
 
     def unless(self, failure: DmpError | None) -> "LoopOutcome":
         """Return an outcome with this failure; the first one that came is the one told."""
         if failure is None or self.failure is not None:
             return self
-        return LoopOutcome(str(failure), failure)
+        return replace(self, reason=str(failure), failure=failure, signal=None)
+
+    def error(self, before: str = "", after: str = "") -> DmpError | None:
+        """Return what the command ends with once all is kept; None where nothing failed.
+
+        An arm that may still move is told last, and decides the exit code.
+
+        Parameters
+        ----------
+        before, after : str
+            Put around the reason.
+        """
+        if self.stop.confirmed:
+            said = f"{before}{self.reason}{after}"
+            return None if self.failure is None else type(self.failure)(said)
+        alone = self.reason == str(self.stop)  # nothing else went wrong
+        return self.stop.error(after.lstrip("; ") if alone else f"{before}{self.reason}{after}")
 
 
 class StoppedAtOnce(Exception):  # noqa: N818
@@ -145,7 +170,9 @@ class ControlLoop(ABC):
 
     Attributes
     ----------
-    pace : LoopTiming
+    timing : LoopTiming
+    stop_outcome : StopOutcome
+        How the arm was left, once it was.
     """
 
     def __init__(
@@ -161,6 +188,8 @@ class ControlLoop(ABC):
         self._streams, self._hindrance = streams, hindrance
         self._interruption = Interruption()
         self._begin = 0.0
+        self._moved = self._rested = False  # servo mode was asked for, and the arm rests in it
+        self.stop_outcome = AT_REST
         self._last: Pose | None = None  # what the arm was led to last
 
     def _take(self, arm: ReadyArm, force: WrenchSource | None) -> None:
@@ -180,30 +209,41 @@ class ControlLoop(ABC):
             How a signal ended it at once; empty where none did.
         DmpError or None
             What an instrument or a limit has caused; only defects are raised.
+
+        Raises
+        ------
+        UnconfirmedStopError
+            A defect ended it, and the arm may still move.
         """
-        how, failure, stopping = "", None, None
-        try:
-            self._enter()
-            with undisturbed():
-                self._cycles()
-            failure = self._hindrance()
-        except StoppedAtOnce as stop:
-            how = str(stop)
-        except (InstrumentError, RefusedError) as error:
-            failure = error
-        finally:
-            # Also on a defect of ours: nothing may leave the arm moving.
-            stopping = guards.leave(self._arm.servo.stop)
-        return how, failure or stopping
+        how, failure = "", None
+        with stopping.outranking(lambda: self.stop_outcome):
+            try:
+                self._enter()
+                with undisturbed():
+                    self._cycles()
+                failure = self._hindrance()
+            except StoppedAtOnce as stop:
+                how = str(stop)
+            except (InstrumentError, RefusedError) as error:
+                failure = error
+            finally:
+                # Also on a defect of ours: nothing may leave the arm moving.
+                watch = self._moved and not self._rested
+                self.stop_outcome = stopping.stop(self._arm.servo, self._arm.clock, watch)
+        return how, failure
 
     def _outcome(self, how: str, failure: DmpError | None, ended: str) -> LoopOutcome:
         """Put together how it ended, from what `_run` returns and the end that nothing forced."""
-        number = self._interruption.number
+        number, stop = self._interruption.number, self.stop_outcome
         if failure is not None:
-            return LoopOutcome(str(failure), failure)
-        if number is None or not how:
-            return LoopOutcome(ended)
-        return LoopOutcome(f"{signal.Signals(number).name}: {how}", None, number)
+            return LoopOutcome(str(failure), failure, stop=stop)
+        if number is not None and how:
+            reason = f"{signal.Signals(number).name}: {how}"
+            failure = None if stop.confirmed else stop.error()
+            return LoopOutcome(reason, failure, number, stop)
+        if not stop.confirmed:
+            return LoopOutcome(str(stop), stop.error(), stop=stop)
+        return LoopOutcome(ended)
 
     def _heed(self) -> None:
         """Begin nothing that is not wanted any more."""
@@ -273,6 +313,11 @@ class ControlLoop(ABC):
         self._last = setpoint
         if self._streams:
             self._trail.add(*setpoint)
+
+    def _start(self) -> None:
+        """Let the arm enter servo mode; from now on it may move."""
+        self._moved = True
+        self._arm.servo.start(self._period)
 
     @abstractmethod
     def _enter(self) -> None:

@@ -206,10 +206,11 @@ class Recorder(ControlLoop):
         """Hand the arm over to its own drag teaching, or lead it from where it is then."""
         self._heed()
         if isinstance(self._robot, DragTeaching) and not self._streams:
+            self._moved = True
             self._robot.drag()
             self._reference = self._home = None
         else:
-            self._robot.start(self._period)
+            self._start()
             # Not before: it may have been moved since, and arms sink as their brakes are released.
             state = self._robot.state()
             guards.check_state(state, self._workspace)
@@ -253,7 +254,8 @@ class Recorder(ControlLoop):
             # Nothing leads an arm that is dragged by its own teaching: it has only to be stopped.
             return not self._ended or self._reference is not None
         assert self._reference is not None
-        return bool(self._reference.velocity.any()) or not self._rest.reached(cycle.state)
+        self._rested = not self._reference.velocity.any() and self._rest.reached(cycle.state)
+        return not self._rested
 
     def _reason_to_end(self, t: float) -> str:
         hindrance = self._hindrance()

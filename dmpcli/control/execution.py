@@ -281,7 +281,12 @@ def pressed(pressing: ForceTracker) -> str:
 def watch(settings: ExecuteSettings) -> StopLimits:
     """Return when the loop stops by itself."""
     return StopLimits(
-        settings.following_error, settings.following_angle, settings.max_force, settings.max_torque
+        settings.following_error,
+        settings.following_angle,
+        settings.max_force,
+        settings.max_torque,
+        settings.arrival_tolerance,
+        settings.arrival_angle,
     )
 
 
@@ -305,6 +310,7 @@ def record_of(
         "completed": outcome.reason == DONE,
         "missed": loop.timing.missed,
     }
+    facts |= loop.stop_outcome.facts()
     if realtime:
         facts |= loop.timing.facts()
     if loop.pressing is not None and loop.pressing.felt:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from dmpcli.control.cycle import Cycle, StoppedAtOnce
-from dmpcli.control.guards import FollowingErrorMonitor
+from dmpcli.control.guards import LAG, FollowingErrorMonitor
 from dmpcli.control.servo_loop import PlanLoop
 from dmpcli.instruments.protocols import PlanPlayer
 from dmpcli.planning.plan import Pose
@@ -24,6 +24,7 @@ class Playback(PlanLoop):
     """Has the controller play, whose servo is a `PlanPlayer`; there is no force coupling."""
 
     STREAMS = False
+    PATIENCE = LAG + _AHEAD
 
     def _enter(self) -> None:
         """Hand every plan over, then begin, unless something has come up meanwhile."""

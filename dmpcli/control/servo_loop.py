@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
+from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import (
     ControlLoop,
     Cycle,
@@ -18,11 +19,13 @@ from dmpcli.control.cycle import (
     StoppedAtOnce,
 )
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.guards import LAG
 from dmpcli.control.plan_cursor import PlanCursor
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.control.signals import Interruption
 from dmpcli.control.step_limits import StepLimits, check_start
 from dmpcli.errors import DmpError, InputError, RefusedError
+from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Pose
 
@@ -51,6 +54,8 @@ class PlanLoop(ControlLoop):
     ----------
     STREAMS : bool
         Whether the arm waits for our set-points, as in `ControlLoop`.
+    PATIENCE : float
+        By how much more than its look-ahead the arm may lag at a stroke's end, s.
     plan : Plan
         The one that is drawn.
     drawn : list of str
@@ -67,6 +72,7 @@ class PlanLoop(ControlLoop):
     """
 
     STREAMS: ClassVar[bool]
+    PATIENCE: ClassVar[float] = LAG
 
     def __init__(
         self,
@@ -89,7 +95,7 @@ class PlanLoop(ControlLoop):
                 "whole plan by itself; leave mode=file out of --robot"
             )
         self._touch, self._limits = touch, limits
-        self._cursor = PlanCursor(plan, limits, wait=self.pressing is not None)
+        self._draw(plan)
         self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
 
     def run(self, interruption: Interruption) -> LoopOutcome:
@@ -120,7 +126,7 @@ class PlanLoop(ControlLoop):
     def _enter(self) -> None:
         """Enter servo mode, and make sure that the arm still stands where the plan begins."""
         self._heed()
-        self._arm.servo.start(self._period)
+        self._start()
         # To start may take seconds.
         self._heed()
         check_start(self._arm.servo.state(), self.plan, self._limits)
@@ -145,29 +151,61 @@ class PlanLoop(ControlLoop):
     def _goes_on(self, cycle: Cycle) -> bool:
         """Go on until the last plan has ended, or the brake, and the arm stands still."""
         over = self._cursor.finished and (not self._then or self._cursor.braking)
-        if over and self._rest.reached(cycle.state):
-            self._count()
+        self._rested = over and self._rest.reached(cycle.state)
+        self._look(cycle.state)
+        if self._rested:
+            if not self._cursor.braking and self._last is not None:
+                self._arrival.check_rest(cycle.state, self._last)
             return False
         self._advance()
         return True
 
     def _advance(self) -> None:
         """Go on by one set-point; after a plan's last one to the first of the next, where it is."""
-        self._count()
-        if not (self._then and self._cursor.finished) or self._cursor.braking:
+        if self._then and self._cursor.finished and not self._cursor.braking:
+            self._count(over=True)
+            self._draw(self._then.popleft())
+        else:
             self._cursor.advance()
-            return
-        self.plan = self._then.popleft()
-        if self.pressing is not None:
-            self.pressing = self.pressing.on(self.plan)
-        self._cursor = PlanCursor(self.plan, self._limits, wait=self.pressing is not None)
 
-    def _count(self) -> None:
-        """Count the stroke as drawn once the arm has had the time to reach its end, or rests."""
-        behind = 0.0 if self._cursor.finished else self._arm.info.lookahead / self._period
-        arrived = self._cursor.index >= self.plan.last + behind
-        if arrived and self.plan.id not in self.drawn[-1:]:
+    def _draw(self, plan: Plan) -> None:
+        """Go on with a plan, from its first set-point."""
+        if self.pressing is not None and plan is not self.plan:
+            self.pressing = self.pressing.on(plan)
+        pressed, watch = self.pressing is not None, self._watch
+        self.plan, self._counted = plan, False
+        self._cursor = PlanCursor(plan, self._limits, wait=pressed)
+        self._arrival = ArrivalMonitor(plan, watch.arrival, watch.arrival_angle, pressed)
+
+    def _look(self, state: RobotState) -> None:
+        """See how far the arm has come; count the stroke once it has had the time, or rests."""
+        self._arrival.see(state, self._cursor.index)
+        beyond = (self._cursor.index - self.plan.last) * self._period - self._arm.info.lookahead
+        if self._rested and self._cursor.index >= self.plan.last:
+            self._count(over=not self._cursor.braking)
+        elif beyond > -1e-9:
+            self._count(over=beyond > self.PATIENCE and not self._cursor.braking)
+
+    def _count(self, over: bool) -> None:
+        """Count the stroke as drawn if the arm has come to its end.
+
+        Parameters
+        ----------
+        over : bool
+            Whether it must have by now; only where nobody has looked, nobody can tell.
+
+        Raises
+        ------
+        InstrumentError
+            It has not.
+        """
+        if self._counted:
+            return
+        if self._arrival.arrived:
+            self._counted = True
             self.drawn.append(self.plan.id)
+        elif over and self._arrival.looked:
+            self._arrival.refuse()
 
     def _record(self, cycle: Cycle, setpoint: Pose | None, lateness: float | None) -> None:
         index, state = self._cursor.index, cycle.state

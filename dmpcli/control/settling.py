@@ -1,4 +1,4 @@
-"""Whether an arm stands still after its last set-point."""
+"""Whether the arm stands still, and has come to rest behind its last set-point."""
 
 from collections import deque
 
@@ -15,6 +15,37 @@ PATIENCE = 2.0
 """s beyond the look-ahead, after which an arm that still moves has failed."""
 
 _DISTANCE, _ANGLE = 0.02, 0.001  # mm, rad
+
+
+class RestWindow:
+    """The last states of an arm, which rests where none of them is elsewhere.
+
+    Parameters
+    ----------
+    window : float
+        So long it must have stood still, s.
+    """
+
+    def __init__(self, window: float) -> None:
+        self._window = window
+        self._states: deque[RobotState] = deque()
+
+    def rests(self, state: RobotState) -> bool:
+        """Take in a state; tell whether the arm has stood still for the whole window by now."""
+        states = self._states
+        states.append(state)
+        # The oldest one that is kept reaches over the window.
+        while len(states) > 2 and state.t - states[1].t >= self._window - 1e-9:
+            states.popleft()
+        spanned = state.t - states[0].t >= self._window - 1e-9
+        return spanned and all(_near(state, other) for other in states)
+
+    @property
+    def moved(self) -> str:
+        """How far apart the states are, in words."""
+        newest, oldest = self._states[-1], self._states[0]
+        distance, angle = _apart(newest, oldest)
+        return f"moved {distance:.3g} mm, {angle:.3g} rad in {newest.t - oldest.t:.2g} s"
 
 
 class SettlingDetector:
@@ -57,9 +88,14 @@ class SettlingDetector:
             raise InstrumentError(
                 "robot: does not come to rest after its last set-point; see what moves it"
             )
-        return waited >= WINDOW - 1e-9 and all(self._near(state, s) for s in self._states)
+        return waited >= WINDOW - 1e-9 and all(_near(state, s) for s in self._states)
 
-    def _near(self, state: RobotState, other: RobotState) -> bool:
-        moved = float(np.linalg.norm(other.position - state.position))
-        turned = float(np.linalg.norm(log_one(other.rotation @ state.rotation.T)))
-        return moved <= _DISTANCE and turned <= _ANGLE
+
+def _near(state: RobotState, other: RobotState) -> bool:
+    distance, angle = _apart(state, other)
+    return distance <= _DISTANCE and angle <= _ANGLE
+
+
+def _apart(state: RobotState, other: RobotState) -> tuple[float, float]:
+    moved = float(np.linalg.norm(other.position - state.position))
+    return moved, float(np.linalg.norm(log_one(other.rotation @ state.rotation.T)))

@@ -11,6 +11,7 @@ from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.records import file_io, record, schemas
+from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
 from dmpcli.records.trajectory_reader import rows_by_id, stored
@@ -61,13 +62,13 @@ class StrokeSelection:
         return [found.stroke for found in self.found]
 
 
-def find(path: str, wanted: Sequence[str] = ()) -> StrokeSelection:
+def find(path: str | Source, wanted: Sequence[str] = ()) -> StrokeSelection:
     """Read the strokes that are to be executed.
 
     Parameters
     ----------
-    path : str
-        A trajectory file, ``-``, or a batch's folder.
+    path : str or Source
+        A trajectory file, ``-``, or a batch's folder; or the content of a file.
     wanted : sequence of str
         Their ids, in the order in which they are drawn; none means all, in the file's order.
 
@@ -80,7 +81,7 @@ def find(path: str, wanted: Sequence[str] = ()) -> StrokeSelection:
     twice = [name for i, name in enumerate(wanted) if name in wanted[:i]]
     if twice:
         raise InputError(f"--id {twice[0]}: is given twice; a stroke is drawn once in a run")
-    if path != file_io.DASH and Path(path).is_dir():
+    if isinstance(path, str) and path != file_io.DASH and Path(path).is_dir():
         return _in_folder(Path(path), wanted)
     source, rows = _grouped(path)
     names = _chosen(wanted, list(rows), source.name)
@@ -112,7 +113,7 @@ def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
         in_part.setdefault(str(parts[rows_of[name]]), []).append(name)
     # Part by part: the strokes that are drawn stay in memory, the rest of a part does not.
     for part, members in in_part.items():
-        source, rows = _grouped(str(folder / part))
+        source, rows = _grouped(str(file_io.part_in(folder, part, pairs.name)))
         entries.append(record.input_of("trajectory", source))
         for name in members:
             if name not in rows:
@@ -151,9 +152,10 @@ def _pair_facts(pairs: Record, row: int) -> dict[str, Any]:
     return facts
 
 
-def _grouped(path: str) -> tuple[Record, dict[str, Integers]]:
+def _grouped(path: str | Source) -> tuple[Record, dict[str, Integers]]:
     """Read a trajectory file; return it with the rows of each id, in order of appearance."""
-    source = record.decode(file_io.read(path), schemas.TRAJECTORY)
+    content = path if isinstance(path, Source) else file_io.read(path)
+    source = record.decode(content, schemas.TRAJECTORY)
     return source, rows_by_id(source.columns["id"])
 
 

@@ -67,7 +67,8 @@ class Watchdog:
         Raises
         ------
         InstrumentError
-            The loop was away too long; the text says whether the arm was stopped.
+            The loop was away too long; the text says whether the arm was stopped. Not once the
+            loop has stopped it too: then only what the arm itself tells counts.
         """
         self._check()
         now = time.monotonic()
@@ -123,7 +124,7 @@ class Watchdog:
             self._thread = None
 
     def _check(self) -> None:
-        if self._barked:
+        if self._barked and not self._done.is_set():
             self._settled.wait(_PATIENCE)
             raise InstrumentError(self._barked)
 

@@ -263,7 +263,7 @@ def _alpha_f(rest: Floats, forced: Floats, demonstrated: Floats) -> Floats:
     extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
     least = np.maximum(NEGLIGIBLE * extents, ROUNDING)
     told = along > least**2 * len(forced)
-    return np.where(told, across / np.where(told, along, 1.0), 1.0)
+    return np.where(told, across / np.where(told, along, 1.0), 1.0)  # alpha_f of eq. (9)
 
 
 def nearest(points: Floats, path: Floats) -> Floats:

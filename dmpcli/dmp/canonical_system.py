@@ -33,7 +33,7 @@ def phase(t: Floats, tau: float, alpha_1: float) -> Floats:
     array, shape of `t`
         ``exp(-alpha_1 t / tau)``.
     """
-    s: Floats = np.exp(-alpha_1 / tau * np.asarray(t, dtype=float))
+    s: Floats = np.exp(-alpha_1 / tau * np.asarray(t, dtype=float))  # eq. (6), (11)
     return s
 
 
@@ -68,7 +68,7 @@ class Basis:
         """Logarithms of psi, shape (..., N); the x inside the printed (8) is read as s."""
         e: Floats = np.asarray(s, dtype=float)[..., None] - self.centres
         np.square(e, out=e)
-        e *= -self.widths
+        e *= -self.widths  # eq. (8): psi_i = exp(-h_i (s - c_i)²)
         return e
 
     def activations(self, s: Floats) -> Floats:
@@ -136,7 +136,7 @@ class Basis:
             flat = self.window(s.reshape(-1)).normalized().mean(weights)
             return flat.reshape(*s.shape, len(weights))
         psi = self.activations(s)
-        mean: Floats = psi @ weights.T
+        mean: Floats = psi @ weights.T  # eq. (7)
         mean /= psi.sum(axis=-1, keepdims=True)
         return mean
 

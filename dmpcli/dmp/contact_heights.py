@@ -112,14 +112,7 @@ def end_heights(skill: Skill, heights: ContactHeights | None) -> tuple[float, fl
 
 def demonstrated_scale(skill: Skill, t: Floats) -> Floats:
     """Coordinates of the skill's own stroke, at the mean start, goal and length, shape (T, 6)."""
-    r = skill.response(t)
-    x: Floats = (
-        skill.start * r.a
-        + skill.goal * r.b
-        + skill.initial_velocity * r.c
-        + skill.alpha_f * r.forced
-    )
-    return x
+    return skill.response(t).between(skill, skill.start, skill.goal)
 
 
 def _drawn(w: Floats, band: float) -> Floats:

@@ -282,9 +282,7 @@ def _own_reproduction(
     """Roll the skill out at one of several demonstrations' own ends, in its own chart."""
     t = np.linspace(0.0, skill.duration, min(_samples_of(curve), _MOST_SHOWN))
     r, x = skill.response(t), curve(t)
-    reproduced: Floats = (
-        x[0] * r.a + x[-1] * r.b + skill.initial_velocity * r.c + skill.alpha_f * r.forced
-    )
+    reproduced = r.between(skill, x[0], x[-1])
     return _reproduction(x, reproduced, with_lost(judged(x, reproduced, skill.closed), [lost]))
 
 

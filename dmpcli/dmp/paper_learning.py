@@ -163,7 +163,7 @@ def _alpha_f(skill: Skill, responses: Sequence[Response], signals: Sequence[Sign
         extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
         size += len(signal.x) * extents**2
     told = along > _NEGLIGIBLE**2 * size
-    return np.where(told, across / np.where(told, along, 1.0), 1.0)
+    return np.where(told, across / np.where(told, along, 1.0), 1.0)  # alpha_f of eq. (9)
 
 
 def rolled_out(skill: Skill, p: Prepared, share: Floats) -> tuple[Floats, Floats]:

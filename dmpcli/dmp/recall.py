@@ -6,7 +6,6 @@ recorded, beyond what the noise explains; not against what the skill's own learn
 
 import numpy as np
 
-from dmpcli.arrays import Floats
 from dmpcli.dmp.basis_search import Quality, judged
 from dmpcli.dmp.learning import lost_of, with_lost
 from dmpcli.dmp.options import FitOptions
@@ -37,9 +36,7 @@ def recalled(skill: Skill, taught: TaughtStroke) -> Quality:
         # The chart stretches along start-goal alone.
         x[:, 0] *= (skill.goal[0] - skill.start[0]) / taught.length
     r = skill.response(share * skill.duration)
-    reproduced: Floats = (
-        x[0] * r.a + x[-1] * r.b + skill.initial_velocity * r.c + skill.alpha_f * r.forced
-    )
+    reproduced = r.between(skill, x[0], x[-1])
     return with_lost(judged(x, reproduced, skill.closed), [lost_of(taught.seen)])
 
 

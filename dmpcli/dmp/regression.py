@@ -31,7 +31,7 @@ def target_forcing(
     array, shape (T, D)
         ``tau² ẍ + d tau ẋ - k (g - x)``.
     """
-    f: Floats = (
+    f: Floats = (  # eq. (4), (5)
         spring.tau**2 * acceleration + spring.d * spring.tau * velocity - spring.k * (goal - x)
     )
     return f
@@ -58,7 +58,7 @@ def lwr(basis: Basis, s: Floats, xi: Floats, forcing: Floats) -> Floats:
     # A common factor per function cancels; without it a narrow function between two samples is 0/0.
     e -= e.max(axis=0)
     weighted = significant_exp(e).T * xi
-    weights: Floats = (weighted @ forcing / (weighted @ xi)[:, None]).T
+    weights: Floats = (weighted @ forcing / (weighted @ xi)[:, None]).T  # w_i of eq. (7)
     return weights
 
 

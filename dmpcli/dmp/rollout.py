@@ -102,7 +102,7 @@ def curves(skill: Skill, stroke: Floats, heights: ContactHeights | None = None) 
     if np.ptp(skill.spring.k) or np.ptp(skill.spring.d):
         raise RefusedError("a skill whose six axes have different k or d cannot be generalized")
     r = skill.response(stroke)
-    forced = skill.initial_velocity * r.c + skill.alpha_f * r.forced
+    forced = skill.initial_velocity * r.c + skill.alpha_f * r.forced  # eq. (9)
     if skill.model == "modified":
         if skill.learning == "tolerance":  # the paper's plane holds both ends: w is 0 there
             forced[:, 2] += skill.start[2] * r.a[:, 2] + skill.goal[2] * r.b[:, 2]
@@ -241,7 +241,7 @@ def _combined(coefficients: Floats, shared: Floats) -> Floats:
     """Linear combinations of the shared curves, shape (B, T, 3): one matrix product."""
     count = len(coefficients)
     # Axis by axis in memory, so that a file's column is a view of it.
-    flat = coefficients.transpose(1, 0, 2).reshape(-1, 5) @ shared[:5]
+    flat = coefficients.transpose(1, 0, 2).reshape(-1, 5) @ shared[:5]  # eq. (9)-(10), solved
     return flat.reshape(3, count, -1).transpose(1, 2, 0)
 
 

@@ -216,7 +216,7 @@ class Skill:
         """
         s = phase(t, self.spring.tau, self.alpha_1)
         f = self.basis.mean(s, self.weights)
-        f *= self.forcing_factor * s[..., None]
+        f *= self.forcing_factor * s[..., None]  # eq. (7)
         return f
 
     def response(self, t: Floats) -> "Response":
@@ -244,3 +244,24 @@ class Response:
     b: Floats
     c: Floats
     forced: Floats
+
+    def between(self, skill: Skill, start: Floats, goal: Floats) -> Floats:
+        """Return the stroke of a skill in the size in which it was taught, S = 1.
+
+        Parameters
+        ----------
+        skill : Skill
+        start, goal : array, shape (6,)
+            x0 and g, in its coordinates.
+
+        Returns
+        -------
+        array, shape (T, 6)
+        """
+        x: Floats = (  # eq. (9)-(10), solved
+            start * self.a
+            + goal * self.b
+            + skill.initial_velocity * self.c
+            + skill.alpha_f * self.forced
+        )
+        return x

@@ -79,6 +79,7 @@ def transition(spring: TransformationGains, h: Floats) -> Floats:
     cosine = np.where(over, 0.5 * (1.0 + twice), np.cos(x))
     safe = np.where(root > 0, root, 1.0)
     sine = np.where(over, 0.5 * (1.0 - twice) / safe, np.where(root > 0, np.sin(x) / safe, h))
+    # Of tau dV/dt = k (g - x) - d V, eq. (4) and (9), and tau dx/dt = V, eq. (5) and (10).
     E = np.empty((*h.shape[:-1], len(spring.k), 2, 2))
     E[..., 0, 0] = slow * (cosine + half * sine)
     E[..., 0, 1] = slow * sine
@@ -156,7 +157,7 @@ def forced(
         h = h[:1]  # one matrix serves all steps
     kernel = transition(spring, h[:, None] * (1.0 - nodes))[..., 1] / spring.tau
     weighted = f * (weights * h[:, None])[..., None]
-    increments = np.sum(kernel * weighted[..., None], axis=1)
+    increments = np.sum(kernel * weighted[..., None], axis=1)  # eq. (4)-(5), (9)-(10)
 
     states = accumulated(transition(spring, h), increments)
     response = np.zeros((len(t), len(spring.k)))

@@ -19,6 +19,7 @@ from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, spelled
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import ProgramOptions, legs, toolpaths
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import decoder
 
 INCH = 25.4
 LONGEST_ARC = 100_000
@@ -199,6 +200,7 @@ class _Machine:
         )
 
 
+@decoder
 def decode(source: Source, tolerance: float = 0.01, travel: float = 50.0) -> list[MotionStroke]:
     """Read the path of a pen, mm; time by the feeds.
 

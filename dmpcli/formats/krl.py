@@ -23,6 +23,7 @@ from dmpcli.formats.toolpath import (
 )
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import matrices
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.wrench import Tool
 
 LONGEST_NAME = 24
@@ -143,6 +144,7 @@ _HARMLESS = re.compile(
 _NAMES = ("X", "Y", "Z", "A", "B", "C")
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a program of straight moves.
 

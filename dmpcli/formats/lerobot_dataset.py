@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.records import untrusted
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 
@@ -300,7 +301,7 @@ def _readable(file: Path) -> bool:
 
 def _part(file: Path, number: int, wanted: list[str]) -> tuple[Floats, Floats, Floats] | None:
     """State, time and wrench of an episode in one file; None where it holds none of it."""
-    try:
+    with untrusted.decoding(str(file)):
         table = pq.read_table(file, columns=wanted, filters=[("episode_index", "=", number)])
         if not len(table):
             return None
@@ -310,8 +311,4 @@ def _part(file: Path, number: int, wanted: list[str]) -> tuple[Floats, Floats, F
             flat = np.asarray(column.flatten(), dtype=float)
             found.append(flat.reshape(len(table), -1))
         t = np.asarray(table.column("timestamp"), dtype=float)
-    except (pa.ArrowException, OSError, ValueError, KeyError, AttributeError, TypeError):
-        raise InputError(
-            f"{file}: is damaged, or lacks {', '.join(wanted)}; get the dataset again"
-        ) from None
     return found[0], t, found[1]

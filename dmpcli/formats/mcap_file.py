@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import IO, Any
 
 from dmpcli import extras
-from dmpcli.errors import DmpError, InputError
+from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats import ros_messages
 from dmpcli.formats.motion import Motion, MotionStroke
 from dmpcli.formats.ros_messages import MessageReader
+from dmpcli.records import untrusted
 from dmpcli.version import __version__
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -71,14 +72,8 @@ def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[MotionStroke
     """Read the poses of an open file; see `read`."""
     (reading,) = extras.load(ROS, name, "mcap.reader")
     found = MessageReader(name, body)
-    try:
+    with untrusted.decoding(name):
         _take(reading, stream, name, found)
-    except DmpError:
-        raise
-    except Exception as error:
-        # Of damaged bytes the library raises what its parsers of records and chunks do.
-        why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise InputError(f"{name}: is not MCAP, or it is damaged: {why}") from None
     return found.stroke()
 
 

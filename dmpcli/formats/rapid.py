@@ -24,6 +24,7 @@ from dmpcli.formats.toolpath import (
 )
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import wrong
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 from dmpcli.spatial.wrench import Tool
 
@@ -114,6 +115,7 @@ _HARMLESS = re.compile(
 )
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a module of straight moves.
 

@@ -5,11 +5,12 @@ import shutil
 from pathlib import Path
 
 from dmpcli import extras
-from dmpcli.errors import DmpError, InputError
+from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats import ros_messages
 from dmpcli.formats.motion import Motion, MotionStroke
 from dmpcli.formats.ros_messages import MessageReader
+from dmpcli.records import untrusted
 
 METADATA = "metadata.yaml"
 
@@ -70,15 +71,8 @@ def read(folder: Path, body: str | None = None) -> tuple[MotionStroke, list[str]
     (rosbag2,) = extras.load(ROS, name, "rosbags.rosbag2")
     store = ros_messages.typestore(name)
     found = MessageReader(name, body)
-    try:
-        with rosbag2.Reader(folder) as reader:
-            wanted = [one for one in reader.connections if one.msgtype in ros_messages.READ]
-            for one, _, content in reader.messages(connections=wanted) if wanted else ():
-                found.take(one.topic, one.msgtype, store.deserialize_cdr(content, one.msgtype))
-    except DmpError:
-        raise
-    except Exception as error:
-        # Of damaged bytes the library raises what its parsers of YAML, SQLite and CDR do.
-        why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise InputError(f"{name}: is not a ROS 2 bag, or it is damaged: {why}") from None
+    with untrusted.decoding(name), rosbag2.Reader(folder) as reader:
+        wanted = [one for one in reader.connections if one.msgtype in ros_messages.READ]
+        for one, _, content in reader.messages(connections=wanted) if wanted else ():
+            found.take(one.topic, one.msgtype, store.deserialize_cdr(content, one.msgtype))
     return found.stroke()

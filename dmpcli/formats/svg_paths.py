@@ -16,6 +16,7 @@ from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError, counted
 from dmpcli.extras import SVG
 from dmpcli.formats.motion import MotionStroke
+from dmpcli.records import untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import LENGTH
 
@@ -95,15 +96,8 @@ def decode(
 
 def _parsed(svgelements: Any, source: Source) -> Any:
     logging.getLogger("svgelements").setLevel(logging.CRITICAL)
-    try:
+    with untrusted.decoding(source.name):
         return svgelements.SVG.parse(io.BytesIO(source.content), reify=True, ppi=96.0)
-    except RecursionError:
-        raise InputError(f"{source.name}: is nested too deeply to be read") from None
-    except Exception as error:
-        # The library lets pass whatever its parsers of XML and numbers raise.
-        said = str(error).strip().splitlines()
-        why = said[0][:120] if said else type(error).__name__
-        raise InputError(f"{source.name}: cannot be read as SVG: {why}") from None
 
 
 def _pixel(svgelements: Any, unit: str) -> float:
@@ -132,7 +126,7 @@ def _height(drawing: Any, points: Floats) -> float:
 def _lines(svgelements: Any, drawing: Any, name: str, tolerance: float) -> tuple[list[Floats], int]:
     """Polylines of all paths, pixels, y down; and how many texts are not among them."""
     lines, hidden, count = [], 0, 0
-    try:
+    with untrusted.decoding(name):
         for element in drawing.elements():
             values = getattr(element, "values", None) or {}
             if values.get("visibility") == "hidden" or values.get("display") == "none":
@@ -148,10 +142,6 @@ def _lines(svgelements: Any, drawing: Any, name: str, tolerance: float) -> tuple
                     raise InputError(f"{name}: is too long; give a coarser --tolerance")
                 if len(line) > 1:
                     lines.append(line)
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"{name}: a path cannot be read: {str(error)[:120]}") from None
     return lines, hidden
 
 

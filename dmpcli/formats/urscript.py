@@ -22,6 +22,7 @@ from dmpcli.formats.toolpath import (
     toolpaths,
 )
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import exp, log
 from dmpcli.spatial.wrench import Tool
 
@@ -103,6 +104,7 @@ _HARMLESS = re.compile(
 )
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a program of straight moves.
 

@@ -77,6 +77,8 @@ class DriverState:
         space needs to give it only in the first state, for the check against the joints.
     detail : str
         What the controller says about a mode that is not ``ready``; empty where it says nothing.
+    busy : bool or None
+        Whether it says that a motion or program is under way; None where it does not tell.
     """
 
     t: float
@@ -84,6 +86,7 @@ class DriverState:
     joints: Floats | None = None
     pose: Floats | None = None
     detail: str = ""
+    busy: bool | None = None
 
 
 class ServoDriver(Controlled, Protocol):

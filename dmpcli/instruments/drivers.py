@@ -1,13 +1,14 @@
 """Deprecated: where version 0.1 had `dmpcli.instruments.driver_protocol`; import from there."""
 
-import warnings
+from typing import Literal
 
-from dmpcli.instruments.driver_protocol import *  # noqa: F403
-from dmpcli.instruments.driver_protocol import DriverInfo as Declaration  # noqa: F401
+from dmpcli.moved import names_of
 
-warnings.warn(
-    "dmpcli.instruments.drivers is dmpcli.instruments.driver_protocol now, and its Declaration "
-    "DriverInfo; the old names will go",
-    DeprecationWarning,
-    stacklevel=2,
+Pacing = Literal["client", "controller"]
+"""What a driver had to declare, and nobody reads any more."""
+
+__getattr__ = names_of(
+    "dmpcli.instruments.drivers",
+    "dmpcli.instruments.driver_protocol",
+    {"Declaration": "DriverInfo"},
 )

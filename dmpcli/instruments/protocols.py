@@ -136,6 +136,9 @@ class RobotState:
         Actual joint angles, rad, where the robot tells them.
     detail : str
         What the controller says about a mode that is not ``ready``.
+    busy : bool or None
+        Whether its controller says that a motion or program is under way; None where it does not
+        tell.
     """
 
     t: float
@@ -144,6 +147,7 @@ class RobotState:
     mode: RobotMode
     joints: Floats | None = None
     detail: str = ""
+    busy: bool | None = None
 
 
 class Controlled(Protocol):

@@ -101,7 +101,7 @@ class PoseServo:
                 raise RefusedError(f"robot: {said.mode}{said.detail and f': {said.detail}'}")
             pose = self._pose  # an arm that is stopped may tell no pose; it has one
         self._pose = pose
-        return RobotState(said.t, *pose, said.mode, joints, said.detail)
+        return RobotState(said.t, *pose, said.mode, joints, said.detail, said.busy)
 
     def start(self, period: float) -> None:
         """Enter servo mode.

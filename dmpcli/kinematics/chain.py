@@ -2,11 +2,15 @@
 
 import math
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.kinematics.models import Arm
+
+# Origin, mm, and axis of a joint.
+_Joint: TypeAlias = tuple[float, float, float, float, float, float]
 
 
 def forward(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
@@ -43,17 +47,59 @@ def forward_one(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
         mm.
     rotation : array, shape (3, 3)
     """
+    position, rotation, _ = _walked(arm, q)
+    return position, rotation
+
+
+def forward_moving(
+    arm: Arm, q: Floats, speeds: Floats, tip: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """`forward_one`, and how a point fixed to the flange moves while the joints turn.
+
+    Parameters
+    ----------
+    arm : Arm
+    q, speeds : array, shape (6,)
+        rad, rad/s.
+    tip : array, shape (3,)
+        The point, mm, flange axes.
+
+    Returns
+    -------
+    position : array, shape (3,)
+        Of the flange, mm.
+    rotation : array, shape (3, 3)
+    velocity : array, shape (6,)
+        Of the point, mm/s, and angular, rad/s; base axes. The sum over the joints of
+        ``[z × (p - p_i), z]`` times the joint's speed.
+    """
+    position, rotation, joints = _walked(arm, q)
+    x, y, z = (position + rotation @ tip).tolist()
+    vx = vy = vz = wx = wy = wz = 0.0
+    for speed, (px, py, pz, zx, zy, zz) in zip(speeds.tolist(), joints, strict=True):
+        vx += speed * (zy * (z - pz) - zz * (y - py))
+        vy += speed * (zz * (x - px) - zx * (z - pz))
+        vz += speed * (zx * (y - py) - zy * (x - px))
+        wx, wy, wz = wx + speed * zx, wy + speed * zy, wz + speed * zz
+    return position, rotation, np.array([vx, vy, vz, wx, wy, wz])
+
+
+def _walked(arm: Arm, q: Floats) -> tuple[Floats, Floats, list[_Joint]]:
+    """Pose of the flange; origin and axis of each joint that was passed on the way."""
     # Origin and axes of the link frame that has been reached.
     px = py = pz = 0.0
     xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    joints: list[_Joint] = []
     for angle, (offset, d, a, ca, sa) in zip(q.tolist(), _links(arm), strict=True):
+        joints.append((px, py, pz, zx, zy, zz))
         c, s = math.cos(angle + offset), math.sin(angle + offset)
         ux, uy, uz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
         xx, xy, xz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
         px, py, pz = px + d * zx + a * xx, py + d * zy + a * xy, pz + d * zz + a * xz
         yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
         zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
-    return np.array([px, py, pz]), np.array([[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]])
+    rotation: Floats = np.array([[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]])
+    return np.array([px, py, pz]), rotation, joints
 
 
 @lru_cache

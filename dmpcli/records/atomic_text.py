@@ -1,12 +1,14 @@
 """Text files that are written row by row, and take their names when whole."""
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
 from dmpcli.errors import InputError
+from dmpcli.records import file_io
 
 
 @contextlib.contextmanager
@@ -24,15 +26,15 @@ def growing(folder: Path, names: Sequence[str]) -> Iterator[list[TextIO]]:
         The folder cannot be made, or a file not be written.
     """
     made = _make(folder)
-    # A leading dot: dataset readers and Make patterns pass over them.
-    files = {name: folder / f".{name}.{os.getpid()}.tmp" for name in names}
+    files: dict[str, Path] = {}
     whole = False
     try:
         with contextlib.ExitStack() as stack:
-            streams: list[TextIO] = [
-                stack.enter_context(file.open("w", encoding="utf-8", newline=""))
-                for file in files.values()
-            ]
+            streams: list[TextIO] = []
+            for name in names:
+                files[name], raw = file_io.temporary_of(folder / name)
+                text = io.TextIOWrapper(raw, encoding="utf-8", newline="")
+                streams.append(stack.enter_context(text))
             yield streams
             for stream in streams:
                 stream.flush()

@@ -14,6 +14,10 @@ TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
 """Arrow's types of the columns that a schema names."""
 
 
+LARGEST = 1e30
+"""Numbers beyond this are no quantity in any unit, and their products would overflow."""
+
+
 def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:
     """Return the wanted columns of a pyarrow table as arrays, checked.
 
@@ -58,11 +62,12 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
         array[unknown] = -1
         return array
     array[unknown] = np.nan
-    bad = ~np.isfinite(array) & ~unknown
+    bad = ~(np.abs(array) <= LARGEST) & ~unknown
     if bad.any():
         row = int(np.argmax(bad))
+        wrong = f"is beyond {LARGEST:g}" if np.isfinite(array[row]) else "is not a finite number"
         raise InputError(
-            f"{name}: column {key!r}, row {row + 1}: {array[row]} is not a finite number; "
+            f"{name}: column {key!r}, row {row + 1}: {array[row]} {wrong}; "
             "remove the row or mend it"
         )
     return array
@@ -78,9 +83,17 @@ def nulls(values: Any) -> Booleans:
     return unknown
 
 
+def dtype_of(kind: Any) -> np.dtype[Any]:
+    """Return numpy's type for Arrow's type of numbers; to_pandas_dtype may import pandas for it."""
+    letter = (
+        "f" if pa.types.is_floating(kind) else "u" if pa.types.is_unsigned_integer(kind) else "i"
+    )
+    return np.dtype(f"{letter}{kind.bit_width // 8}")
+
+
 def numbers(values: Any) -> AnyArray:
     """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
-    dtype = values.type.to_pandas_dtype()
+    dtype = dtype_of(values.type)
     if len(values) == 0:
         return np.empty(0, dtype=dtype)
     whole = np.frombuffer(values.buffers()[1], dtype=dtype)

@@ -8,6 +8,7 @@ from dmpcli.records import directions, json_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
 from dmpcli.records.pairs import FARTHEST
+from dmpcli.records.untrusted import decoder
 from dmpcli.surfaces.cylinder import Cylinder
 
 SCHEMA = "cylinder"
@@ -35,6 +36,7 @@ class CylinderFile(JsonPart):
     radius: Radius
 
 
+@decoder
 def decode(source: Source) -> Cylinder:
     """Read a cylinder file.
 

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import file_io, manifest, record, schemas
+from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
 from dmpcli.records.columns import columns_of
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, OK, START
@@ -125,7 +124,12 @@ def read(folder: Path) -> tuple[BatchFolder, list[str]]:
 
 
 def _table(folder: Path, source: Source) -> BatchFolder:
-    table = record.parquet_table(source)
+    with untrusted.decoding(source.name):
+        return _decoded(folder, source)
+
+
+def _decoded(folder: Path, source: Source) -> BatchFolder:
+    table = parquet.table(source)
     provenance = _provenance(table.schema.metadata, schemas.PAIRS, source.name)
     named = schemas.PAIRS.columns
     numbers = (*START, *GOAL, *NORMAL)
@@ -143,9 +147,8 @@ def _table(folder: Path, source: Source) -> BatchFolder:
             np.asarray(words.indices.fill_null(-1))
         ]
     drawn = np.flatnonzero(part >= 0)
-    bad = next((f for f in files if Path(f).name != f), None)
-    if bad is not None:
-        raise InputError(f"{source.name}: column 'part' names {bad!r}, which is no file of its own")
+    for name in files:
+        file_io.part_in(folder, name, source.name)
 
     def stacked(names: Sequence[str]) -> Floats | None:
         if not all(name in columns for name in names):
@@ -239,7 +242,7 @@ def _compared(batch: BatchFolder) -> list[str]:
             f"{path}: lists {lost[0]}, of which {file_io.TABLE} knows nothing; draw the batch again"
         )
     for entry in found.parts:
-        part = batch.folder / entry.file
+        part = file_io.part_in(batch.folder, entry.file, str(path))
         size = part.stat().st_size if part.is_file() else None
         if size is not None and size != entry.bytes:
             raise InputError(
@@ -256,17 +259,12 @@ def _compared(batch: BatchFolder) -> list[str]:
     ]
 
 
-def _footer(batch: BatchFolder, file: str) -> tuple[pq.ParquetFile, Provenance]:
+def _footer(batch: BatchFolder, file: str) -> tuple[Any, Provenance]:
     """Open a part and check that it belongs to the batch."""
     path = batch.folder / file
     if not path.is_file():
         raise InputError(f"{path}: is missing, {file_io.TABLE} names it; {AGAIN}")
-    try:
-        part = pq.ParquetFile(path, read_dictionary=["id"])
-    except (pa.ArrowException, OSError, ValueError):
-        raise InputError(
-            f"{path}: is not a Parquet file, or it is truncated or damaged; draw the batch again"
-        ) from None
+    part = parquet.opened(path, "draw the batch again", ["id"])
     found = _provenance(part.schema_arrow.metadata, schemas.TRAJECTORY, str(path))
     ours = batch.provenance
     if (found.options, found.inputs) != (ours.options, ours.inputs):
@@ -326,15 +324,19 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
     chosen = ["id", *(n for n in wanted if n in known)]
     expected = batch.ids.take(pa.array(rows))
     done, offset, groups = 0, 0, part.metadata.num_row_groups
+    size = (batch.folder / file).stat().st_size
     carried: dict[str, AnyArray] = {}
     waiting: str | None = None
     for group in range(groups):
+        parquet.judge(name, part.metadata, size, [group])
         try:
-            table = part.read_row_group(group, columns=chosen)
-        except (pa.ArrowException, OSError, ValueError):
+            with untrusted.decoding(name, f"row group {group + 1}"):
+                table = part.read_row_group(group, columns=chosen)
+        except InputError:
             raise InputError(f"{name}: is damaged inside; draw the batch again") from None
-        ids, first = _runs(table.column("id"), name)
-        found = columns_of(table, wanted, name)
+        with untrusted.decoding(name, f"row group {group + 1}"):
+            found = columns_of(table, wanted, name)
+            ids, first = _runs(table.column("id"), name)
         if waiting is not None:
             before = len(next(iter(carried.values())))
             found = {n: np.concatenate([carried[n], c]) for n, c in found.items()}

@@ -6,10 +6,15 @@ An output is written beside its name and renamed when whole: never half there.
 import contextlib
 import hashlib
 import io
+import itertools
 import os
+import re
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
+from uuid import uuid4
 
 from dmpcli.errors import InputError
 
@@ -58,7 +63,7 @@ def read(path: str | Path, journal: bool = False) -> Source:
     if str(path) == DASH:
         if sys.stdin is None:
             raise InputError("standard input: is closed; name a file")
-        source = Source(shown(path), sys.stdin.buffer.read())
+        source = Source(shown(path), _limited(shown(path), sys.stdin.buffer, journal))
     else:
         file = Path(path)
         if file.is_dir():
@@ -66,11 +71,9 @@ def read(path: str | Path, journal: bool = False) -> Source:
         try:
             size = file.stat().st_size
             if size > LARGEST and not journal:
-                raise InputError(
-                    f"{path}: has {size / 2**30:.1f} GiB, more than the {LARGEST / 2**30:.0f} GiB "
-                    "that are read at once; cut it in parts, or leave out what is not needed"
-                )
-            source = Source(str(path), file.read_bytes())
+                raise _too_large(str(path), f"{size / 2**30:.1f} GiB")
+            with file.open("rb") as stream:
+                source = Source(str(path), _limited(str(path), stream, journal))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file; check the name") from None
         except OSError as error:
@@ -83,6 +86,23 @@ def read(path: str | Path, journal: bool = False) -> Source:
             f"'dmpcli recover {path} -o FILE'"
         )
     return source
+
+
+def _limited(name: str, stream: BinaryIO, journal: bool) -> bytes:
+    """Read a stream to its end, which not every one has: a device or a pipe may go on for ever."""
+    if journal:
+        return stream.read()
+    content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise _too_large(name, f"over {LARGEST / 2**30:.0f} GiB")
+    return content
+
+
+def _too_large(name: str, size: str) -> InputError:
+    return InputError(
+        f"{name}: has {size}, more than the {LARGEST / 2**30:.0f} GiB that are read at once; cut "
+        "it in parts, or leave out what is not needed"
+    )
 
 
 def shown(path: str | Path, output: bool = False) -> str:
@@ -149,27 +169,100 @@ def write(path: str | Path, content: bytes) -> None:
         say(content)
         return
     check_writable(path)
-    file = Path(path)
-    if file.is_symlink():
-        file = file.resolve()
+    file = _meant(path)
     if file.exists() and not file.is_file():
         _write_special(file, content)
         return
-    # A leading dot: dataset readers and Make patterns pass over it.
-    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+    with _written(path, file, content) as temporary:
+        temporary.replace(file)
+
+
+def write_new(path: str | Path, content: bytes) -> Path:
+    """Write one output that must replace nothing: what cannot be made again, beside what appeared.
+
+    Returns
+    -------
+    Path
+        Of the file: another name, ``NAME-1`` and so on, where somebody has made one of this name
+        meanwhile.
+
+    Raises
+    ------
+    InputError
+        The output cannot be written (no space, no right).
+    """
+    if str(path) == DASH:
+        say(content)
+        return Path(DASH)
+    check_writable(path)
+    file = _meant(path)
+    if file.exists() and not file.is_file():
+        _write_special(file, content)
+        return file
+    with _written(path, file, content) as temporary:
+        for number in itertools.count(1):
+            try:
+                _link(temporary, file)
+            except FileExistsError:
+                file = _meant(path)
+                file = file.with_name(f"{file.stem}-{number}{file.suffix}")
+            else:
+                return file
+    raise AssertionError  # pragma: no cover
+
+
+def _meant(path: str | Path) -> Path:
+    """Return the file that a name means: where a link leads."""
+    file = Path(path)
+    return file.resolve() if file.is_symlink() else file
+
+
+def temporary_of(file: Path) -> tuple[Path, BinaryIO]:
+    """Create the file that an output grows in, beside it: one that nobody else has.
+
+    It is created exclusively, so that no link that somebody has laid there is followed. The
+    leading dot is for dataset readers and Make patterns, which pass over it.
+
+    Raises
+    ------
+    OSError
+    """
+    temporary = file.with_name(f".{file.name}.{uuid4().hex}.tmp")
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0)
+    return temporary, os.fdopen(os.open(temporary, flags, 0o666), "wb")
+
+
+@contextlib.contextmanager
+def _written(path: str | Path, file: Path, content: bytes) -> Iterator[Path]:
+    """Write a temporary file whole, for the caller to name; what is left of it goes."""
+    temporary: Path | None = None
     try:
-        with temporary.open("wb") as stream:
+        temporary, stream = temporary_of(file)
+        with stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.replace(file)
+        yield temporary
         with contextlib.suppress(OSError):  # some network file systems cannot
             sync_folder(file.parent)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+
+
+def _link(temporary: Path, file: Path) -> None:
+    """Give a file its name, unless there is one of that name; FileExistsError where there is."""
+    try:
+        os.link(temporary, file, follow_symlinks=False)
+    except FileExistsError:
+        raise
+    except OSError:
+        # A file system without links: the name is taken first, then replaced by who has taken it.
+        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        temporary.replace(file)
 
 
 def sync_folder(folder: Path) -> None:
@@ -192,6 +285,33 @@ def _write_special(file: Path, content: bytes) -> None:
 PART = "part-*.parquet"
 TABLE = "pairs.parquet"
 MANIFEST = "_manifest.json"
+
+_PART_NAME = re.compile(r"part-[0-9]{5,12}\.parquet")
+
+
+def part_in(folder: str | Path, name: str, by: str) -> Path:
+    """Return the file of a part of a batch, which a table or manifest names.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Of the batch.
+    name : str
+        As it stands there.
+    by : str
+        What messages call the table or manifest.
+
+    Raises
+    ------
+    InputError
+        It is no name of a part: a file elsewhere, or one of another kind.
+    """
+    if _PART_NAME.fullmatch(name) is None:
+        raise InputError(
+            f"{by}: names the part {name!r}, and parts are called part-00000.parquet and so on; "
+            "draw the batch again"
+        )
+    return Path(folder) / name
 
 
 def check_folder(path: str | Path) -> None:

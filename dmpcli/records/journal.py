@@ -30,6 +30,7 @@ from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
 from dmpcli.records.row_buffer import RowBuffer
 from dmpcli.records.schemas import SCHEMAS, Schema
+from dmpcli.records.untrusted import decoder
 
 SUFFIX = file_io.JOURNAL
 VERSION = 1
@@ -38,6 +39,8 @@ EVERY = 0.5
 LONGEST_BEHIND = 3.0
 """s: a disk that takes longer for one writing counts as failed."""
 _MOST_ROWS = 8192
+_MOST_GROUPS, _WIDEST = 256, 64
+"""Groups of numbers in a row, and numbers in a group: far more than any run has."""
 _KEY, _CHECK, _END = b"dmpcli journal", b"crc32", b"facts"
 
 
@@ -297,6 +300,7 @@ class Found:
     unread: int
 
 
+@decoder
 def read(source: Source) -> Found:
     """Read a journal, wherever it breaks off.
 
@@ -315,13 +319,14 @@ def read(source: Source) -> Found:
         try:
             batch, notes = stream.read_next_batch_with_custom_metadata()
             batch.validate(full=True)
-        except (StopIteration, pa.ArrowException, OSError):
-            break
-        said = {} if notes is None else notes.to_dict()
-        facts = _ended(said)
-        if facts is not None:
-            provenance, whole = replace(provenance, facts=facts), True
-        elif not _take(rows, batch, said):
+            said = {} if notes is None else notes.to_dict()
+            facts = _ended(said)
+            if facts is not None:
+                provenance, whole = replace(provenance, facts=facts), True
+            elif not _take(rows, batch, said):
+                break
+        # Damaged bytes, whatever is wrong with them: what came before is whole by its checksums.
+        except Exception:
             break
         read_to = reader.tell()
     if not len(rows):
@@ -358,6 +363,11 @@ def _begun(header: Mapping[str, Any], name: str) -> tuple[RowBuffer, Provenance]
         known = header["provenance"]
         provenance = Provenance(**known | {"inputs": tuple(known["inputs"])})
         groups = {str(group): int(width) for group, width in header["groups"]}
+        # Before memory is taken for them.
+        if not (0 < len(groups) <= _MOST_GROUPS and min(groups.values()) > 0):
+            raise ValueError
+        if max(groups.values()) > _WIDEST or len(header["texts"]) > _MOST_GROUPS:
+            raise ValueError
         return RowBuffer(groups, [str(text) for text in header["texts"]]), provenance
     except (KeyError, TypeError, ValueError):
         raise InputError(f"{name}: is damaged in its head; its rows cannot be read") from None

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dmpcli.errors import InputError
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import LARGEST_JSON, decoder, judge_size
 
 
 class JsonPart(BaseModel):
@@ -26,6 +27,7 @@ M = TypeVar("M", bound=BaseModel)
 
 def json_document(source: Source) -> dict[str, Any]:
     """Return the object of a JSON source; InputError where it is not JSON or not an object."""
+    judge_size(source.name, len(source.content), LARGEST_JSON, "a JSON file")
     try:
         document = json.loads(source.content)
     except (ValueError, RecursionError) as error:
@@ -36,6 +38,7 @@ def json_document(source: Source) -> dict[str, Any]:
     return document
 
 
+@decoder
 def validated(
     source: Source, model: type[M], name: str, version: int, remedy: str, by_hand: bool = False
 ) -> M:

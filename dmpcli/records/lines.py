@@ -7,11 +7,13 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import POSITION
+from dmpcli.records.untrusted import decoder
 
 _SAME = 1e-6
 _LEAST = 3
 
 
+@decoder
 def read(source: Source) -> list[tuple[str, Floats]]:
     """Read a table with ``x y z``, mm, in base axes, and with ``id`` where it has several lines.
 

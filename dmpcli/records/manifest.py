@@ -9,6 +9,7 @@ from dmpcli.records import json_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
 from dmpcli.records.record import Provenance
+from dmpcli.records.untrusted import decoder
 
 SCHEMA = "manifest"
 VERSION = 1
@@ -58,6 +59,7 @@ def document(
     return found.model_dump(mode="json", by_alias=True)
 
 
+@decoder
 def decode(source: Source) -> Manifest:
     """Read a manifest.
 

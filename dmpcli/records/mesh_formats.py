@@ -6,6 +6,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import mesh_obj, mesh_off, mesh_ply, mesh_stl
 from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
+from dmpcli.records.untrusted import decoder
 
 _MARK = b"\xef\xbb\xbf"
 """What some programs begin a text with: a byte order mark."""
@@ -15,6 +16,7 @@ class ForeignMeshError(InputError):
     """A part in a format that is not read, but is known by name."""
 
 
+@decoder
 def triangles(source: Source) -> Triangles:
     """Read the triangles of an STL (binary or text), OBJ, PLY or OFF file as they stand.
 

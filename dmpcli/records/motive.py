@@ -14,6 +14,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.untrusted import decoder
 
 MAGIC = b"Format Version,"
 
@@ -25,6 +26,7 @@ def is_motive(source: Source) -> bool:
     return source.content.removeprefix(b"\xef\xbb\xbf").lstrip()[: len(MAGIC)] == MAGIC
 
 
+@decoder
 def read(source: Source) -> Table:
     """Read an export whole.
 

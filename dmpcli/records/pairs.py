@@ -10,6 +10,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 START = ("x0", "y0", "z0")
@@ -66,6 +67,7 @@ class PairTable:
         return np.array([status == OK for status in self.status], dtype=bool)
 
 
+@decoder
 def read(source: Source) -> PairTable:
     """Read a table with the columns ``x0 y0 z0 xg yg zg`` and what else it has.
 

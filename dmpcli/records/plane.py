@@ -7,6 +7,7 @@ from pydantic import Field
 from dmpcli.records import directions, json_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
+from dmpcli.records.untrusted import decoder
 from dmpcli.surfaces.plane import Plane
 
 SCHEMA = "plane"
@@ -27,6 +28,7 @@ class PlaneFile(JsonPart):
     ]
 
 
+@decoder
 def decode(source: Source) -> Plane:
     """Read a plane file.
 

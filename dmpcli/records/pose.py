@@ -11,6 +11,7 @@ from dmpcli.records import file_io, json_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
 from dmpcli.records.schemas import EULER, FRAME
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.version import __version__
@@ -100,6 +101,7 @@ def encode(
     return (json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
+@decoder
 def decode(source: Source) -> tuple[Pose, PoseFile]:
     """Read a pose file.
 

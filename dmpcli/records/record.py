@@ -12,10 +12,11 @@ import pyarrow.parquet as pq
 
 from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
-from dmpcli.records import schemas
-from dmpcli.records.columns import TYPES, columns_of
+from dmpcli.records import parquet, schemas, untrusted
+from dmpcli.records.columns import TYPES, columns_of, dtype_of
 from dmpcli.records.file_io import PART, TABLE, Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 from dmpcli.version import __version__
 
@@ -155,6 +156,7 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
         compression=form.compression,
         use_byte_stream_split=floats,
         use_dictionary=others,
+        write_page_checksum=True,
     )
 
 
@@ -191,7 +193,7 @@ def _arrow(values: Any, kind: Any) -> Any:
     valid = None
     if values.dtype.kind == "f" and _may_hold_nan(values):
         valid = _validity(~np.isnan(values))
-    data = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    data = np.ascontiguousarray(values, dtype=dtype_of(kind))
     return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)])
 
 
@@ -234,6 +236,7 @@ def header(record: Record) -> bytes:
     return json.dumps(entries, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
+@decoder
 def decode(source: Source, expected: Schema | None = None) -> Record:
     """Read one of our Parquet files.
 
@@ -249,7 +252,7 @@ def decode(source: Source, expected: Schema | None = None) -> Record:
         Not a Parquet file, truncated, not one of ours, of another schema, of a newer version, a
         required column missing or of the wrong type, or a value that is not finite.
     """
-    table = parquet_table(source)
+    table = parquet.table(source)
     header = header_of(table, source.name)
     schema = SCHEMAS.get(str(header.get("schema")))
     if schema is None:
@@ -279,28 +282,18 @@ def decode(source: Source, expected: Schema | None = None) -> Record:
     )
 
 
-def parquet_table(source: Source) -> Any:
-    """Return the pyarrow table of a Parquet source, ours or another's."""
-    try:
-        return pq.ParquetFile(source.open()).read()
-    except (pa.ArrowException, OSError, ValueError):
-        raise InputError(
-            f"{source.name}: is not a Parquet file, or it is truncated or damaged; make it again"
-        ) from None
-
-
 def is_ours(source: Source) -> bool:
     """Tell whether a source is a Parquet file that carries our metadata.
 
     A damaged Parquet file counts as ours, so that `decode` says what is wrong with it.
     """
-    if source.content[:4] != b"PAR1":
+    if source.content[:4] != parquet.MAGIC:
         return False
     try:
-        metadata = pq.read_schema(source.open()).metadata or {}
-    except (pa.ArrowException, OSError, ValueError):
+        with untrusted.decoding(source.name):
+            return KEY in (pq.read_schema(source.open()).metadata or {})
+    except InputError:
         return True
-    return KEY in metadata
 
 
 def header_of(table: Any, name: str) -> dict[str, Any]:
@@ -312,7 +305,7 @@ def header_of(table: Any, name: str) -> dict[str, Any]:
         )
     try:
         header = json.loads(metadata[KEY])
-    except ValueError:
+    except (ValueError, RecursionError):
         header = None
     if not isinstance(header, dict) or not _sound(header):
         raise InputError(f"{name}: its dmpcli metadata are damaged; make the file again")
@@ -382,10 +375,11 @@ def foreign_parts(folder: Path) -> list[str]:
     foreign = []
     for file in sorted([*folder.glob(PART), *folder.glob(TABLE)]):
         try:
-            ours = KEY in (pq.read_schema(file).metadata or {})
-        except (pa.ArrowException, OSError, ValueError):
+            with untrusted.decoding(str(file)):
+                ours = KEY in (pq.read_schema(file).metadata or {})
+        except InputError:
             with file.open("rb") as stream:
-                ours = stream.read(4) in (b"", b"PAR1")
+                ours = stream.read(4) in (b"", parquet.MAGIC)
         if not ours:
             foreign.append(file.name)
     return foreign

@@ -28,6 +28,7 @@ from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
 from dmpcli.records.schemas import EULER_ANGLES
 from dmpcli.records.tables import HeadlessError, Table
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 SHORTEST = 10
@@ -117,6 +118,7 @@ class _Reading:
         return unit
 
 
+@decoder
 def read(source: Source, layout: Layout | None = None) -> Recording:
     """Read a demonstration for learning.
 

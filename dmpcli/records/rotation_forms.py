@@ -207,6 +207,8 @@ def calmer(values: Floats) -> str | None:
         trace = np.einsum("tij,tij->t", R[1:], R[:-1])
         return float(np.arccos(np.clip((trace.min() - 1.0) / 2.0, -1.0, 1.0)))
 
+    if len(values) < 2:
+        return None
     largest = leap("XYZ")
     if largest < _LEAP:
         return None

@@ -20,6 +20,7 @@ from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import EULER, FRAME
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 SCHEMA: Literal["skill"] = "skill"
@@ -209,6 +210,7 @@ def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenanc
     return (_layout(document.model_dump(mode="json", by_alias=True)) + "\n").encode()
 
 
+@decoder
 def decode(source: Source) -> tuple[Skill, SkillFile]:
     """Read a skill file.
 

@@ -8,6 +8,7 @@ from dmpcli.records import directions, json_files
 from dmpcli.records.cylinder import Radius
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
+from dmpcli.records.untrusted import decoder
 from dmpcli.surfaces.sphere import Sphere
 
 SCHEMA = "sphere"
@@ -25,6 +26,7 @@ class SphereFile(JsonPart):
     radius: Radius
 
 
+@decoder
 def decode(source: Source) -> Sphere:
     """Read a sphere file.
 

@@ -11,6 +11,7 @@ from dmpcli.records import record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import from_euler, to_euler
 
 _RAW, _STD = suffixed(WRENCH, "raw"), suffixed(WRENCH, "std")
@@ -67,6 +68,7 @@ def encode(poses: list[StaticPose], provenance: Provenance) -> bytes:
     return record.encode(Record(schemas.POSES, columns, provenance))
 
 
+@decoder
 def decode(source: Source) -> tuple[list[StaticPose], dict[str, Any]]:
     """Read static poses, and the facts that their file states.
 
@@ -89,10 +91,11 @@ def decode(source: Source) -> tuple[list[StaticPose], dict[str, Any]]:
     # A file from elsewhere may not say how the tool rested.
     still = {name: found.columns.get(name, np.zeros(len(found))) for name in _STILL}
     moved, turned, unsteady = (np.nan_to_num(still[name]) for name in _STILL)
+    t, position = found.t, found.position()
     poses = [
         StaticPose(
-            float(found.t[i]),
-            found.position()[i],
+            float(t[i]),
+            position[i],
             rotation[i],
             float(moved[i]),
             float(turned[i]),

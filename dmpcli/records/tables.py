@@ -16,10 +16,9 @@ import pyarrow as pa
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import columns, list_columns, record
+from dmpcli.records import columns, list_columns, parquet, untrusted
 from dmpcli.records.file_io import Source
-
-PARQUET_MAGIC = b"PAR1"
+from dmpcli.records.untrusted import decoder
 
 _BLOCK = 1 << 24
 _LONGEST_LINE = 1 << 20
@@ -87,12 +86,14 @@ class Table:
             The column is missing, or a value is text, empty, NaN or infinite; names the row.
         """
         values = self.floats(column)
-        bad = ~np.isfinite(values)
+        bad = ~(np.abs(values) <= columns.LARGEST)
         if bad.any():
             row = int(np.argmax(bad))
+            finite = bool(np.isfinite(values[row]))
             raise InputError(
                 f"{self.name}: column {column!r}, {self.at(row)}: {self.shown(column, row)} is "
-                "not a finite number; mend or remove the row"
+                + (f"beyond {columns.LARGEST:g}" if finite else "not a finite number")
+                + "; mend or remove the row"
             )
         return values
 
@@ -171,9 +172,10 @@ def _floats(values: Any, decimal: str = ".") -> Floats:
 
 def is_parquet(source: Source) -> bool:
     """Tell a Parquet file by its first bytes."""
-    return source.content[:4] == PARQUET_MAGIC
+    return source.content[:4] == parquet.MAGIC
 
 
+@decoder
 def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -> Table:
     """Read a CSV or Parquet table whole.
 
@@ -203,7 +205,7 @@ def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -
 
 
 def _parquet(source: Source) -> Table:
-    table = record.parquet_table(source)
+    table = parquet.table(source)
     columns: dict[str, Any] = {}
     for name in table.column_names:
         columns |= list_columns.expanded(name, table.column(name).combine_chunks())
@@ -215,6 +217,7 @@ def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
     end = text.find(b"\n") if b"\n" in text else len(text)
     separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
     names = _cells(text[:end], separator)
+    untrusted.judge_columns(source.name, len(names))
     headless = bool(names) and all(map(_is_number, names))
     if headless and not given:
         raise HeadlessError(source.name, int(lines[0]), len(names))
@@ -231,7 +234,7 @@ def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
         body = _single_spaces(body)
     elif b'"' in body:
         body = re.sub(re.escape(separator) + rb"[ \t]+\"", separator + b'"', body)
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    twice = parquet.twice(names)
     if twice is not None:
         raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
     if decimal is None:

@@ -19,6 +19,7 @@ from dmpcli.records import json_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
 from dmpcli.records.schemas import EULER
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import from_euler, to_euler
 from dmpcli.spatial.wrench import Tool
 from dmpcli.version import __version__
@@ -160,6 +161,7 @@ def encode(tool: Tool, calibration: Calibration | None = None) -> bytes:
     return (json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
+@decoder
 def decode(source: Source) -> Tool:
     """Read a tool file with its payload.
 
@@ -185,6 +187,7 @@ def decode(source: Source) -> Tool:
     )
 
 
+@decoder
 def geometry(source: Source) -> Tool:
     """Read where TCP and sensor sit on the flange; a payload, if there is one, is left out.
 

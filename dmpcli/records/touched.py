@@ -7,9 +7,11 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import tables
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION
 from dmpcli.records.tables import Table
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 PART = ("px", "py", "pz")
@@ -46,6 +48,7 @@ class Touched:
         return ~np.isnan(self.part[:, 0])
 
 
+@decoder
 def read(source: Source) -> Touched:
     """Read a table with ``x y z`` and, where they are known, ``px py pz`` and ``ax ay az``.
 
@@ -66,7 +69,7 @@ def _approach(table: Table) -> Floats | None:
         if not all(name in table.columns for name in EULER_ANGLES):
             return None
         angles = np.stack([table.floats(name) for name in EULER_ANGLES], axis=1)
-        known = np.asarray(np.isfinite(angles).all(axis=1))
+        known = np.asarray((np.abs(angles) <= LARGEST).all(axis=1))
         return rotations.from_euler(np.where(known[:, None], angles, np.nan))[..., 2]
     length = np.linalg.norm(said, axis=1, keepdims=True)
     if (length == 0.0).any():
@@ -90,7 +93,7 @@ def _three(table: Table, names: tuple[str, ...], what: str) -> Floats | None:
         )
     values = np.stack([table.floats(name) for name in names], axis=1)
     empty = np.stack([table.empty(name) for name in names], axis=1)
-    bad = ~np.isfinite(values) & ~np.asarray(empty.all(axis=1))[:, None]
+    bad = ~(np.abs(values) <= LARGEST) & ~np.asarray(empty.all(axis=1))[:, None]
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise InputError(

@@ -76,6 +76,12 @@ class ExecuteSettings(Settings):
     # second: what a look-ahead delays is no error, what stands still or strays is.
     following_error: Annotated[Positive, Option("Stop when the arm strays further.", "mm")] = 5.0
     following_angle: Positive = 0.1
+    # Of the arm at a stroke's end, and at rest at the end of the run, from where it was led to.
+    # Under force coupling only across the normal.
+    arrival_tolerance: Annotated[
+        Positive, Option("How far off its end a stroke may come to rest.", "mm")
+    ] = 1.0
+    arrival_angle: Annotated[Positive, Option("The same, turned.", "rad")] = 0.0175
     max_force: Annotated[Positive, Option("Stop at a larger force on the tool.", "N")] = 50.0
     max_torque: Annotated[Positive, Option("Stop at a larger torque about its tip.", "N·m")] = 5.0
     # What a tool file's zero may miss at rest, N, and N·m at 0.1 m; see RecordSettings.

@@ -7,6 +7,7 @@ are refused by name. Presets that come with the program are addressed by name.
 
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +16,12 @@ from dmpcli.errors import InputError
 from dmpcli.settings.model import Settings, number, settings_of
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
+    from pydantic import TypeAdapter, ValidationError
+
+LARGEST = 2**18
+"""Bytes of a file of settings; ours have one or two thousand."""
+
+_DEEPEST = 64
 
 UNITS = {"length": "mm", "angle": "rad", "time": "s", "force": "N", "torque": "N·m"}
 
@@ -48,7 +54,7 @@ def resolve(
         A file is missing or is not TOML, states other units, lacks the section, names an unknown
         key, or a value is of the wrong type, out of range, NaN or infinite.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     merged: dict[str, Any] = {}
     origin: dict[str, str] = {}
@@ -60,9 +66,17 @@ def resolve(
         origin |= dict.fromkeys(values, label)
     given = {key: value for key, value in options.items() if value is not None}
     try:
-        return TypeAdapter(kind).validate_python(merged | given)
+        checked: S = _adapter(kind).validate_python(merged | given)  # type: ignore[arg-type]
     except ValidationError as error:
         raise InputError(_first(error, kind, given, origin)) from None
+    return checked
+
+
+@lru_cache
+def _adapter(kind: Any) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def preset_names() -> list[str]:
@@ -85,18 +99,34 @@ def _preset(name: str, section: str) -> tuple[str, dict[str, Any]]:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise InputError(f"{path}: is larger than {LARGEST} bytes, and no file of settings")
+        return content.decode("utf-8").replace("\r\n", "\n")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the name") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text: {error}") from None
 
 
-def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, Any]]:
+def _parsed(label: str, text: str) -> dict[str, Any]:
+    """Parse TOML; whatever its parser meets is an error of the file."""
+    # A key of n parts takes it n² steps.
+    deep = next((n for n, x in enumerate(text.split("\n"), 1) if x.count(".") > _DEEPEST), None)
+    if deep is not None:
+        raise InputError(f"{label}: line {deep}: has more than {_DEEPEST} points; split the line")
     try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{label}: is not TOML of ours: it is nested too deep") from None
+    # TOMLDecodeError, and what int or datetime say of numbers and dates beyond their bounds.
+    except (ValueError, OverflowError, TypeError, LookupError, AttributeError) as error:
         raise InputError(f"{label}: is not TOML: {error}") from None
+
+
+def _toml_section(label: str, text: str, section: str) -> tuple[str, dict[str, Any]]:
+    document = _parsed(label, text)
     units = document.get("units", {})
     for quantity, unit in units.items() if isinstance(units, dict) else [("units", units)]:
         if UNITS.get(quantity) != unit:

@@ -13,6 +13,7 @@ from dmpcli.dmp import reference_paths
 from dmpcli.errors import InputError
 from dmpcli.records import file_io
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import decoder
 from dmpcli.settings.record import RecordSettings
 
 AXES = ("x", "y", "z")
@@ -111,6 +112,7 @@ def _from_csv(source: Source) -> Reference:
     )
 
 
+@decoder
 def read_points(source: Source) -> Floats:
     """Read the points of a polyline from the columns x, y, z (mm) of a CSV file.
 

@@ -18,6 +18,9 @@ ENOUGH = 1e-6
 MOST_SHOTS = 14
 # Headings tried at once where the chord's own does not lead to the goal.
 FAN = np.radians(np.linspace(-75.0, 75.0, 21))
+STRETCHES = (1.0, 1.15, 1.4)
+# So many shots at once, where there are less of them to begin with.
+_SHOTS = 2000
 
 
 @dataclass
@@ -231,15 +234,22 @@ def _of_all_headings(mesh: TriangleMesh, aim: Aim, _shot: Shot) -> Aim:
 def _best_of_fan(mesh: TriangleMesh, aim: Aim, shot: Shot) -> Aim:
     """Aim along the heading of a fan, and with the length, that comes nearest to the goal."""
     count = len(aim.steps)
+    own = np.arange(count)
     nearest = np.full(count, np.inf)
-    best = aim.rows(np.arange(count))
-    for angle in FAN:
-        heading = np.cos(angle) * aim.direction + np.sin(angle) * cross(aim.normal, aim.direction)
-        for stretch in (1.0, 1.15, 1.4):
-            trial = aim.rows(np.arange(count))
-            trial.direction, trial.length = heading, stretch * aim.length
-            gap = length(shot(mesh, trial).position - aim.goal)[:, 0]
-            closer = gap < nearest
-            nearest[closer] = gap[closer]
-            best.direction[closer], best.length[closer] = heading[closer], trial.length[closer]
+    best = aim.rows(own)
+    tries = np.array([(angle, stretch) for angle in FAN for stretch in STRETCHES])
+    # A shot takes as many rounds for one as for many.
+    at_once = max(1, _SHOTS // max(1, count))
+    for some in np.split(tries, range(at_once, len(tries), at_once)):
+        angle, stretch = np.repeat(some, count, axis=0).T[..., None]
+        trial = aim.rows(np.tile(own, len(some)))
+        aside = cross(trial.normal, trial.direction)
+        trial.direction = np.cos(angle) * trial.direction + np.sin(angle) * aside
+        trial.length = stretch * trial.length
+        gap = length(shot(mesh, trial).position - trial.goal).reshape(len(some), count)
+        gap[np.isnan(gap)] = np.inf
+        closer = gap.min(axis=0, initial=np.inf) < nearest
+        rows = (gap.argmin(axis=0) * count + own)[closer]
+        nearest[closer] = gap.min(axis=0)[closer]
+        best.direction[closer], best.length[closer] = trial.direction[rows], trial.length[rows]
     return best

@@ -23,6 +23,17 @@ SHOWN = 20
 
 def write(ready: Ready, output: Path, wanted: BatchOptions) -> None:
     """Draw the batch into a folder and say what became of it."""
+    _tell(ready.table, output, Shard(*wanted.share), draw_into(ready, output, wanted))
+
+
+def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
+    """Draw the batch into a folder; return what was drawn.
+
+    Raises
+    ------
+    InputError
+        No pair can be drawn.
+    """
     task, table, duration = ready.task, ready.table, ready.duration
     if not table.good.any():
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
@@ -33,16 +44,14 @@ def write(ready: Ready, output: Path, wanted: BatchOptions) -> None:
     form = Form(wanted.float32, wanted.compression)
     job = Job(task, wanted.stop, replace(ready.provenance, facts=facts), form, str(output))
     pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
-    shard = Shard(*wanted.share)
-    batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, shard)
+    batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, Shard(*wanted.share))
     draw_with = _workers(wanted)
     first = table.good.nonzero()[0][:1]
     with about("skill"):
         # A skill that gives no stroke must not cost an older batch.
         draw(task.skill, pairs[first], duration[first], task.surface, task.style)
     with progress("drawing", batch.count) as advance:
-        summary = batch.run(draw_with, advance)
-    _tell(table, output, shard, summary)
+        return batch.run(draw_with, advance)
 
 
 def _workers(wanted: BatchOptions) -> Draw:
@@ -61,7 +70,6 @@ def _workers(wanted: BatchOptions) -> Draw:
 
 
 def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> None:
-
     if summary.unfolded:
         warn(
             f"{counted(summary.unfolded, 'stroke')} across a sharp crease, where no tool can "

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from dmpcli.arrays import Floats
 from dmpcli.dmp.drawn_strokes import OnBorder
 from dmpcli.dmp.rollout import Pairs
-from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, learned_skill, record, recordings, schemas
 from dmpcli.records.learned_skill import LearnedSkill
@@ -26,7 +25,6 @@ from dmpcli.settings.layers import resolve
 from dmpcli.settings.options import Given
 from dmpcli.settings.recording import RecordingOptions
 from dmpcli.spatial.rotations import to_euler
-from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import batches, process, single, surface_input, values
 from dmpcli.workflows.fit import check_said, learn
@@ -34,7 +32,7 @@ from dmpcli.workflows.generalize import Order, prepared
 from dmpcli.workflows.generalize_inputs import one_pair
 from dmpcli.workflows.ranges import within
 from dmpcli.workflows.surface_input import SurfaceInput
-from dmpcli.workflows.values import Demonstration, DrawnTrajectory, Run, TrajectoryBatch
+from dmpcli.workflows.values import Demonstration, DrawnTrajectory, TrajectoryBatch
 
 MANY = "start and goal"
 """What messages call a table of pairs that was given as arrays."""
@@ -69,9 +67,9 @@ def read(path: str | Path, **said: Any) -> Any:
     if record.is_ours(source):
         found = record.decode(source)
         if found.schema is schemas.TRAJECTORY:
-            return values.of_record(found)
+            return values.of_record(found, source)
         if found.schema is schemas.RUN:
-            return Run(found.t, found.position(), found.rotation(), record=found)
+            return values.of_run(found, source)
         if found.schema is not schemas.DEMONSTRATION:
             raise InputError(f"{path}: is a {found.schema.name} file, which holds no stroke")
     return values.demonstration(source, resolve(RecordingOptions, said).as_layout())
@@ -96,17 +94,7 @@ def write(value: Any, path: str | Path) -> None:
             raise InputError(f"{path}: this batch was read from a folder; copy that one")
         batches.write(value.ready, Path(path), BatchOptions(on_error="skip"))
         return
-    if isinstance(value, LearnedSkill):
-        content = value.content
-    elif isinstance(value, Skill):
-        raise InputError(f"{path}: only a skill that `fit` or `read` gave can be written")
-    elif isinstance(value, Demonstration):
-        content = value.file().content
-    elif isinstance(value, Trajectory):
-        content = record.encode(values.record_of(value))
-    else:
-        raise InputError(f"{path}: a {type(value).__name__} is nothing that can be written")
-    file_io.write(path, content)
+    file_io.write(path, values.source_of(value, str(path)).content)
 
 
 def read_surface(
@@ -260,17 +248,6 @@ def generalize(
     if first.ndim == 1:
         return values.of_record(single.draw_one(ready).record)
     return values.drawn_batch(ready)
-
-
-def wave_heights(stroke: Trajectory) -> Floats:
-    """Heights between consecutive extrema across the start-goal line, mm; none of a line.
-
-    Parameters
-    ----------
-    stroke : Demonstration, Trajectory or Run
-        A demonstration is seen as `fit` sees it.
-    """
-    return values.measured(stroke).wave.heights
 
 
 def _named(surface: Surface | None) -> SurfaceInput | None:

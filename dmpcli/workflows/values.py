@@ -1,5 +1,8 @@
 """The values of the Python API: demonstrations, trajectories, batches and runs."""
 
+import contextlib
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,18 +13,22 @@ from dmpcli.arrays import Floats, Integers
 from dmpcli.batch.part import settle
 from dmpcli.dmp.feasibility import snapped
 from dmpcli.dmp.generalization import draw
+from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError, about
 from dmpcli.records import file_io, record, recordings, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
+from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import OK
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.strokes import strokes_of
+from dmpcli.settings.batch import BatchOptions
 from dmpcli.spatial.rotations import from_euler, to_euler
 from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.workflows import batches
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.recording import recording
 
@@ -52,9 +59,10 @@ class Demonstration(Trajectory):
 
 @dataclass(frozen=True)
 class DrawnTrajectory(StoredTrajectory):
-    """A trajectory with the record that it is written as."""
+    """A trajectory with the record that it is written as, and the file that it was read from."""
 
     record: Record | None = field(default=None, repr=False, compare=False)
+    source: Source | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,7 @@ class Run(Trajectory):
     """What an arm did; the record holds what was planned and sent, and when."""
 
     record: Record | None = field(default=None, repr=False, compare=False)
+    source: Source | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -81,12 +90,15 @@ class TrajectoryBatch(Trajectory):
     ids : list of str, length B
     ready : Ready, optional
         What it was drawn from.
+    folder : Path, optional
+        That it was read from.
     """
 
     status: list[str] = field(default_factory=list)
     length: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ids: list[str] = field(default_factory=list)
     ready: Ready | None = field(default=None, repr=False, compare=False)
+    folder: Path | None = field(default=None, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -108,15 +120,28 @@ def demonstration(source: Source, form: Layout | None) -> Demonstration:
     return Demonstration(stroke.t, stroke.position, stroke.rotation, source=source, layout=layout)
 
 
-def of_record(found: Record) -> DrawnTrajectory | TrajectoryBatch:
+def of_record(found: Record, source: Source | None = None) -> DrawnTrajectory | TrajectoryBatch:
     """Return the trajectory of a trajectory file, or as a batch those of several ids."""
     strokes = [stored(found, name, rows) for name, rows in rows_by_id(found.columns["id"]).items()]
     if len(strokes) > 1:
         return _padded(list(strokes), [one.id for one in strokes], [OK] * len(strokes))
     [one] = strokes
     return DrawnTrajectory(
-        one.t, one.position, one.rotation, one.normal, one.id, one.first_row, one.facts, found
+        one.t,
+        one.position,
+        one.rotation,
+        one.normal,
+        one.id,
+        one.first_row,
+        one.facts,
+        found,
+        source,
     )
+
+
+def of_run(found: Record, source: Source | None = None) -> Run:
+    """Return what an arm did as a value."""
+    return Run(found.t, found.position(), found.rotation(), record=found, source=source)
 
 
 def batch_in(folder: Path) -> TrajectoryBatch:
@@ -129,7 +154,8 @@ def batch_in(folder: Path) -> TrajectoryBatch:
         for key, rows in rows_by_id(part.columns["id"]).items():
             known[key] = stored(part, key, rows)
     ids = [str(name) for name in pairs.columns["id"]]
-    return _padded([known.get(name) for name in ids], ids, list(map(str, pairs.columns["status"])))
+    status = list(map(str, pairs.columns["status"]))
+    return replace(_padded([known.get(name) for name in ids], ids, status), folder=folder)
 
 
 def drawn_batch(ready: Ready) -> TrajectoryBatch:
@@ -220,6 +246,47 @@ def record_of(one: Trajectory) -> Record:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
         columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
+
+
+def source_of(value: Any, path: str = "") -> Source:
+    """Return the file that a value was read from or is written as.
+
+    Parameters
+    ----------
+    value : Demonstration, LearnedSkill, Trajectory or Run
+    path : str
+        What a message is to name.
+
+    Raises
+    ------
+    InputError
+        It is none of them.
+    """
+    name = f"{path}: " if path else ""
+    if isinstance(value, LearnedSkill):
+        return Source(value.name, value.content)
+    if isinstance(value, Skill):
+        raise InputError(f"{name}only a skill that `fit` or `read` gave can be written")
+    if isinstance(value, Demonstration):
+        return value.file()
+    if isinstance(value, DrawnTrajectory | Run) and value.source is not None:
+        return value.source
+    if isinstance(value, Trajectory):
+        made = record_of(value)
+        return Source(made.name or made.schema.name, record.encode(made))
+    raise InputError(f"{name}a {type(value).__name__} is nothing that can be written")
+
+
+@contextlib.contextmanager
+def folder_of(batch: TrajectoryBatch) -> Iterator[Path]:
+    """Lend the folder of a batch: the one that it was read from, else one that is removed again."""
+    if batch.folder is not None:
+        yield batch.folder
+        return
+    assert batch.ready is not None
+    with tempfile.TemporaryDirectory() as folder:
+        batches.draw_into(batch.ready, Path(folder), BatchOptions(on_error="skip"))
+        yield Path(folder)
 
 
 def measured(one: Trajectory) -> ReportedStroke:

@@ -7,20 +7,13 @@ import subprocess
 import jsonschema
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli import cli
 from dmpcli.records import record, schemas, static_poses
 from dmpcli.records import tool as tool_file
 from dmpcli.records.file_io import Source, read
 from dmpcli.simulation.mock import PEN
+from tests.commands.running import ended as run
 from tests.commands.terminal import DMPCLI, Terminal
-
-
-def run(*arguments, expect=0):
-    result = CliRunner().invoke(cli.app, list(map(str, arguments)))
-    assert result.exit_code == expect, result.output
-    return result
 
 
 def calibrate(*arguments, expect=0):

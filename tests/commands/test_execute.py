@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,19 +13,17 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from dmpcli.cli import app
-from dmpcli.commands.execute import ExecutionRequest, _check_output
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, record, schemas, tool
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.mock import PEN
+from dmpcli.workflows.execute import ExecutionRequest, check_output
+from tests.commands.running import ended
+from tests.minimum_jerk import minimum_jerk
 
 START = np.array([-551.030, 131.399, -17.560])
 FACTS = {"k": [100.0] * 6, "d": [20.0] * 6, "tau": 5.0, "alpha_e": [5.0] * 6}
 REALTIME = ["--realtime", "--robot", "mock:?lag=0.2"]
-
-
-def minimum_jerk(s):
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def columns(duration=10.0, rate=50.0, name="0", oriented=True):
@@ -53,10 +52,7 @@ def traj(tmp_path):
     return written(tmp_path / "traj.parquet", columns())
 
 
-def execute(*arguments, expect=0):
-    result = CliRunner().invoke(app, ["execute", *map(str, arguments)])
-    assert result.exit_code == expect, (result.exit_code, result.stderr, result.exception)
-    return result
+execute = partial(ended, "execute")
 
 
 def run_of(path):
@@ -289,11 +285,11 @@ def batch(tmp_path):
     folder.mkdir()
     first, second = columns(name="a"), columns(duration=5.0, name="b")
     both = {k: np.concatenate([first[k], second[k]]) for k in first}
-    written(folder / "part-0.parquet", both, normal=None)
+    written(folder / "part-00000.parquet", both, normal=None)
     pairs = {
         "id": np.array(["a", "b", "c"], dtype=object),
         "duration": np.array([10.0, 5.0, 5.0]),
-        "part": np.array(["part-0.parquet", "part-0.parquet", ""], dtype=object),
+        "part": np.array(["part-00000.parquet", "part-00000.parquet", ""], dtype=object),
         "status": np.array(["ok", "ok", "start is 3 mm off the plane"], dtype=object),
         "nx": np.zeros(3),
         "ny": np.zeros(3),
@@ -476,8 +472,8 @@ def test_only_a_simulated_run_replaces_an_older_one(traj, tmp_path):
     out.write_bytes(b"older")
     request = ExecutionRequest(str(traj), (), str(out), "mock:", None, None, None, *[False] * 4)
     with pytest.raises(InputError, match="--force replaces it"):
-        _check_output(request, repeatable=False)
-    _check_output(dataclasses.replace(request, force=True), repeatable=False)
+        check_output(request, repeatable=False)
+    check_output(dataclasses.replace(request, force=True), repeatable=False)
     assert out.read_bytes() == b"older"
     execute(traj, "-o", out)
     assert len(run_of(out)) > 500

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from typer.testing import CliRunner
 from dmpcli.cli import app
 from dmpcli.records import file_io, record, schemas
 from dmpcli.records.record import Provenance, Record
+from tests.commands.running import ended
+from tests.minimum_jerk import minimum_jerk
 
 PERIOD = 0.02
 ORIGIN = np.array([-550.0, 130.0, -17.5])
@@ -24,10 +27,6 @@ FACTS |= {"model": "modified"}
 PLACES = {"a": (0, 0, 0.0), "b": (70, -60, 0.6), "c": (-90, 30, -1.0), "d": (40, 80, 2.5)}
 LIMITS = (250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
 """Defaults of execute: speed, acceleration, jerk of the tip and of the rotation."""
-
-
-def minimum_jerk(s):
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def columns(name, place, seconds=4.0, rate=50.0, lean=LEAN):
@@ -89,10 +88,7 @@ def batch(tmp_path_factory):
     return made(tmp_path_factory.mktemp("many") / "batch")
 
 
-def execute(*arguments, expect=0):
-    result = CliRunner().invoke(app, ["execute", *map(str, arguments)])
-    assert result.exit_code == expect, (result.exit_code, result.stderr, result.exception)
-    return result
+execute = partial(ended, "execute")
 
 
 def run_of(path):

@@ -1,18 +1,17 @@
 """execute --robot-model: the arm's joints are judged before anything moves."""
 
 import json
+from functools import partial
 
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
+from tests.commands.running import invoke
 from tests.commands.test_execute import columns, written
 
 MODEL = ["--robot-model", "ec66"]
 
 
-def execute(*args):
-    return CliRunner().invoke(app, ["execute", *map(str, args)])
+execute = partial(invoke, "execute")
 
 
 @pytest.fixture

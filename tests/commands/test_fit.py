@@ -1,20 +1,18 @@
 """fit at the command line: what it says, writes and refuses."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from dmpcli import cli
+from tests.commands.running import invoke
 from tests.dmp.strokes import paper_stroke
 
-
-def run(*args):
-    return CliRunner().invoke(cli.app, ["fit", *map(str, args)])
+run = partial(invoke, "fit")
 
 
 @pytest.fixture

@@ -1,26 +1,25 @@
 """generalize at the command line: one pair, many pairs, planes, and what gets refused."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from dmpcli import cli
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.records import file_io, record, schemas, skill
 from dmpcli.records.record import Provenance
+from tests.commands.running import invoke
 from tests.dmp.strokes import GOAL, START, circle, paper_stroke
 
 PAIR = ["--start", -701.698, 132.420, -17.538, "--goal", -807.597, 129.739, -17.518]
 
 
-def run(*args):
-    return CliRunner().invoke(cli.app, ["generalize", *map(str, args)])
+run = partial(invoke, "generalize")
 
 
 def write_skill(path, stroke, **choices):

@@ -4,16 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
 from dmpcli.records import file_io, record
+from tests.commands.running import invoke as run
 from tests.commands.test_generalize import write_skill
 from tests.dmp.strokes import paper_stroke
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+from tests.minimum_jerk import minimum_jerk
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +17,7 @@ def skill(tmp_path_factory):
     """One wave on y = 0, first bulge to +z, between two lifts that tell no side: ±3 mm."""
     folder = tmp_path_factory.mktemp("wall")
     r = np.linspace(0.0, 1.0, 601)
-    s = 10 * r**3 - 15 * r**4 + 6 * r**5
+    s = minimum_jerk(r)
     y = 3.0 * (np.exp(-(((s - 0.3) / 0.02) ** 2)) - np.exp(-(((s - 0.7) / 0.02) ** 2)))
     table = np.column_stack([6 * r, 300 * s, y, 40 * np.sin(2 * np.pi * s)])
     np.savetxt(folder / "wall.csv", table, delimiter=",", header="t,x,y,z", comments="")

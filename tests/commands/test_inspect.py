@@ -1,21 +1,19 @@
 """``dmpcli inspect`` through the real command line: ours, damaged, and from elsewhere."""
 
 import json
+from functools import partial
 
 import jsonschema
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
+from tests.commands.running import invoke
 from tests.records.meshes import box, grid, obj, written
 from tests.reporting.example_files import demonstration, paper_files, put, trajectory, wave
 
-
-def dmpcli(*words, stdin=None):
-    return CliRunner().invoke(app, ["inspect", *map(str, words)], input=stdin)
+dmpcli = partial(invoke, "inspect")
 
 
 def found(*words, stdin=None):

@@ -6,10 +6,9 @@ import re
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from dmpcli import cli
 from dmpcli.records import file_io, record
+from tests.commands.running import invoke as run
 from tests.commands.test_generalize import write_skill
 from tests.dmp.strokes import paper_stroke
 from tests.records.meshes import box, obj
@@ -20,10 +19,6 @@ R, T = Rotation.from_euler("XYZ", SIX[3:]).as_matrix(), np.array(SIX[:3])
 TOP = np.array([[-50.0, 5.0, 20.0], [50.0, 0.0, 20.0]])
 IN_BASE = TOP @ R.T + T
 POSE = ["--surface-pose", *SIX]
-
-
-def run(*args):
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 def ends(points):

@@ -21,6 +21,7 @@ from dmpcli.records.record import Provenance, decode
 from dmpcli.records.row_buffer import RowBuffer
 from dmpcli.records.schemas import DEMONSTRATION
 from dmpcli.simulation.mock import PEN, MockServo
+from dmpcli.workflows import record as workflow
 from tests.control.drag_fakes import drag_settings
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -224,12 +225,12 @@ def test_nobody_presses_enter_where_no_person_sits():
 
 def test_a_real_recording_is_replaced_by_force_only(tmp_path):
     out = tmp_path / "demo.parquet"
-    record.check_output(str(out), repeatable=False, force=False)
+    workflow.check_output(str(out), repeatable=False, force=False)
     out.write_bytes(b"real")
-    record.check_output(str(out), repeatable=True, force=False)
-    record.check_output(str(out), repeatable=False, force=True)
+    workflow.check_output(str(out), repeatable=True, force=False)
+    workflow.check_output(str(out), repeatable=False, force=True)
     with pytest.raises(InputError, match="--force"):
-        record.check_output(str(out), repeatable=False, force=False)
+        workflow.check_output(str(out), repeatable=False, force=False)
 
 
 @pytest.fixture
@@ -267,7 +268,7 @@ def test_options_of_the_mocks_hand_are_refused_where_a_person_draws(tmp_path, op
 
 def test_a_persons_recording_says_nothing_of_a_reference():
     settings = drag_settings()
-    known = record._provenance(settings, {"robot": "elite"}, False, None, None)
+    known = workflow.provenance_of(settings, {"robot": "elite"}, False, None, None)
     assert known.facts == {"simulated": False}
     assert known.options["damping"] == list(settings.damping)
     assert not known.options.keys() & {"reference", "start", "goal", "wave_height", "seed"}
@@ -350,11 +351,12 @@ def test_a_second_signal_while_the_file_is_written_does_not_lose_it(tmp_path, mo
 
 
 def test_a_defect_keeps_the_recording_and_its_traceback(tmp_path, monkeypatch):
-    read = MockServo.state
+    read, at = MockServo.state, [0.0]
 
     def broken(servo):
         state = read(servo)
-        return 1 / 0 if state.t > 3.0 else state
+        at.append(state.t)
+        return 1 / 0 if at[-1] > 3.0 >= at[-2] else state
 
     monkeypatch.setattr(MockServo, "state", broken)
     out = tmp_path / "demo.parquet"

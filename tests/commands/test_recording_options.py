@@ -4,9 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli import cli
+from tests.commands.running import invoke as run
 from tests.records.foreign import QUATERNION, XYZ, R, T, table
 
 METRES = XYZ / 1000
@@ -40,10 +39,6 @@ READ = {
         ["--map", "t=zeit", "--map", "x=px"],
     ),
 }
-
-
-def run(*args):
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 @pytest.mark.parametrize("name", READ)

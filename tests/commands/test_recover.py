@@ -164,3 +164,50 @@ def test_the_clock_stays_in_the_journal(drawn, tmp_path):
     recover(path, "-o", out)
     assert len(journal.read(file_io.read(path, journal=True)).rows.numbers("clock")) == 20
     assert "clock" not in record.decode(file_io.read(out)).columns
+
+
+@pytest.mark.parametrize("failure", [None, InstrumentError("the arm is gone")])
+def test_a_real_run_replaces_no_file_that_appeared_meanwhile(failure, drawn, tmp_path, caplog):
+    out = tmp_path / "run.parquet"
+    keeper = RunOutput(str(out), realtime=True, replaces=False)
+    keeper.check()
+    keeper.begin(drawn.rows, schemas.DEMONSTRATION, KNOWN)
+    out.write_bytes(b"theirs")
+    whole = Record(schemas.DEMONSTRATION, drawn.columns(), KNOWN)
+    on_terminal(quiet=True)
+    told = "appeared meanwhile and is not replaced; what was measured is kept in .*run-1.parquet"
+    if failure is None:
+        with pytest.raises(InputError, match=told):
+            keeper.keep(whole, failure)
+    else:
+        keeper.keep(whole, failure)
+    assert out.read_bytes() == b"theirs"
+    kept = tmp_path / "run-1.parquet"
+    assert (keeper.kept, keeper.output) == (True, str(kept))
+    back = record.decode(file_io.read(kept))
+    assert back.columns["x"].tobytes() == drawn.columns()["x"].tobytes()
+    assert not (tmp_path / "run.parquet.journal").exists()
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_record_replaces_what_appeared_only_if_it_may(force, tmp_path, monkeypatch):
+    from dmpcli.control import workcell
+    from dmpcli.instruments import clock as clocks
+
+    out, begin = tmp_path / "run.parquet", RunOutput.begin
+
+    def somebody_is_faster(keeper, *rest):
+        out.write_bytes(b"theirs")
+        begin(keeper, *rest)
+
+    monkeypatch.setattr(RunOutput, "begin", somebody_is_faster)
+    monkeypatch.setattr(workcell, "repeatable", lambda _: False)
+    monkeypatch.setattr(clocks, "MonotonicClock", clocks.SimulatedClock)
+    monkeypatch.setattr("dmpcli.workflows.record.watched", lambda servo: servo)
+    words = ["record", "-o", str(out), "--reference", "line", "--duration", "1.5"]
+    words += ["--start", "-551", "131", "-17.56", "--goal", "-561", "131", "-17.56"]
+    words += ["--force"] if force else []
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == (0 if force else 2), result.stderr
+    assert (out.read_bytes() == b"theirs") is not force
+    assert (tmp_path / "run-1.parquet").exists() is not force

@@ -2,19 +2,19 @@
 
 import json
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from dmpcli import cli
 from dmpcli.commands import register_checks
 from dmpcli.errors import RefusedError
 from dmpcli.records import file_io, pose, touched
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.registration import RegisteredPart, onto_surface
+from tests.commands.running import invoke
 from tests.records.meshes import box, obj, written
 from tests.surfaces.registration_trial import touched_on, wedge
 
@@ -24,8 +24,7 @@ R, T = Rotation.from_euler("XYZ", SIX[3:]).as_matrix(), np.array(SIX[:3])
 NEAR = ["402", "-118", "34", "0.22", "-0.12", "1.27"]
 
 
-def run(*args):
-    return CliRunner().invoke(cli.app, ["register", *map(str, args)])
+run = partial(invoke, "register")
 
 
 def table(path, points, part=None):

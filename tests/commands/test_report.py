@@ -3,15 +3,15 @@
 import csv
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from tests.commands.running import invoke
 from tests.reporting.example_files import (
     CURVED_GOAL,
     CURVED_START,
@@ -31,9 +31,7 @@ from tests.reporting.example_files import (
     wave,
 )
 
-
-def dmpcli(*words, stdin=None):
-    return CliRunner().invoke(app, ["report", *map(str, words)], input=stdin)
+dmpcli = partial(invoke, "report")
 
 
 def document(*words, stdin=None):
@@ -185,7 +183,7 @@ def batch(folder, count):
     ids = [f"{i}" for i in range(count + 1)]
     for number, chosen in enumerate((ids[:half], ids[half:count])):
         paths = np.vstack([wave(NEW_START, NEW_GOAL, 20.0 + int(i)) for i in chosen])
-        put(folder, f"part-{number}", trajectory(paths, ids=chosen))
+        put(folder, f"part-{number:05d}", trajectory(paths, ids=chosen))
     columns = {"id": np.array(ids, dtype=object)}
     for suffix, point in (("0", NEW_START), ("g", NEW_GOAL)):
         columns |= {
@@ -193,7 +191,7 @@ def batch(folder, count):
         }
     columns |= {n: np.full(count + 1, float(n == "nz")) for n in ("nx", "ny", "nz")}
     columns["duration"] = np.full(count + 1, 10.0)
-    parts = ["part-0.parquet"] * half + ["part-1.parquet"] * (count - half) + [""]
+    parts = ["part-00000.parquet"] * half + ["part-00001.parquet"] * (count - half) + [""]
     columns["part"] = np.array(parts, dtype=object)
     columns["status"] = np.array(["ok"] * count + ["too steep"], dtype=object)
     put(folder, "pairs", Record(schemas.PAIRS, columns, Provenance("generalize")))

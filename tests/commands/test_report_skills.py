@@ -5,16 +5,10 @@ import json
 import matplotlib.image
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli.cli import app
+from tests.commands.running import ended as run
+from tests.minimum_jerk import minimum_jerk
 from tests.reporting.example_files import wave
-
-
-def run(*words, expect=0):
-    result = CliRunner().invoke(app, [*map(str, words)])
-    assert result.exit_code == expect, (words, result.output, result.exception)
-    return result
 
 
 def report(*words):
@@ -137,7 +131,7 @@ def lifting(folder):
     """A stroke on z = 0 that ends with its pen 8 mm up, held straight down."""
     path = wave(np.array([400.0, 0.0, 0.0]), np.array([520.0, 0.0, 0.0]), 30.0, n=801)
     s = np.clip((np.linspace(0.0, 1.0, 801) - 0.55) / 0.3, 0.0, 1.0)
-    path[:, 2] = 8.0 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    path[:, 2] = 8.0 * minimum_jerk(s)
     plate = folder / "plate.json"
     plate.write_text('{"point": [0, 0, 0], "normal": [0, 0, 1]}')
     demo = written(folder / "lifting.csv", path, angles=np.tile([np.pi, 0.0, 0.0], (801, 1)))

@@ -1,21 +1,17 @@
 """touch at the command line: points for register, pairs for generalize."""
 
 import signal
+from functools import partial
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dmpcli import cli
 from dmpcli.records import pairs, tables, touched
 from dmpcli.records.file_io import Source, read
+from tests.commands.running import ended
 from tests.commands.terminal import Terminal
 
-
-def touch(*arguments, expect=0):
-    result = CliRunner().invoke(cli.app, ["touch", *map(str, arguments)])
-    assert result.exit_code == expect, result.output
-    return result
+touch = partial(ended, "touch")
 
 
 def test_points_by_the_clock_are_what_register_reads(tmp_path):

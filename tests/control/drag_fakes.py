@@ -8,7 +8,7 @@ import numpy as np
 from dmpcli.control import workcell
 from dmpcli.control.drag_loop import Recorder
 from dmpcli.instruments.clock import SimulatedClock
-from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo, ServoInfo
+from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.settings import layers
 from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
@@ -42,34 +42,6 @@ def rehearse(robot="mock:", sensor="mock:", **options):
 def positions(recorder):
     columns = recorder.log.columns()
     return columns["t"], np.column_stack([columns[n] for n in "xyz"])
-
-
-class FakeSensor:
-    """Sends `wrench(t)` in sensor axes at its rate, except where `silent(t)`."""
-
-    def __init__(self, clock, wrench=lambda t: np.zeros(6), silent=lambda t: False):
-        self.clock, self.wrench, self.silent = clock, wrench, silent
-        self.limit = np.full(6, 100.0)
-        self.healthy = True
-        self.closed = 0
-        self.seq = 0
-
-    def open(self):
-        return SensorInfo("fake", 1000.0, self.limit)
-
-    def start(self, rate):
-        self.begun, self.rate = self.clock.now(), rate
-
-    def poll(self):
-        samples = []
-        while (t := self.begun + (self.seq + 1) / self.rate) <= self.clock.now() + 1e-9:
-            self.seq += 1
-            if not self.silent(t):
-                samples.append(Sample(t, self.seq, self.wrench(t), self.healthy, 0))
-        return samples
-
-    def close(self):
-        self.closed += 1
 
 
 class FakeServo:

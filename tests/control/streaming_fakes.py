@@ -8,16 +8,13 @@ from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, PlannedStroke, make
 from dmpcli.spatial.rotations import from_euler
+from tests.minimum_jerk import minimum_jerk
 
 PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
 START = np.array([-551.030, 131.399, -17.560])
 LENGTH, AMPLITUDE = 109.0, 25.0
 
 WIDE = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
-
-
-def minimum_jerk(s):
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def sine(t, duration):

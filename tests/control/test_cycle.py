@@ -13,8 +13,10 @@ from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import PlannedStroke, make
-from tests.control.drag_fakes import FakeSensor, FakeServo, drag_settings
+from tests.control.drag_fakes import FakeServo, drag_settings
+from tests.control.fake_sensors import StreamingSensor
 from tests.control.test_drag_loop import WEIGHTLESS
+from tests.minimum_jerk import minimum_jerk
 
 PERIOD, LOOKAHEAD = 0.02, 0.1
 AT = 1.0
@@ -47,7 +49,7 @@ def recorded(stall, asleep):
     clock = Stalling(stall, asleep)
     servo = Slow(clock, LOOKAHEAD)
     settings = drag_settings(tool_check=1000.0)
-    loop = Recorder(servo, FakeSensor(clock), clock, WEIGHTLESS, settings, 3.0)
+    loop = Recorder(servo, StreamingSensor(clock), clock, WEIGHTLESS, settings, 3.0)
     return loop, loop.run().failure
 
 
@@ -56,7 +58,7 @@ def executed(stall, asleep):
     servo = Slow(clock, LOOKAHEAD)
     t = np.arange(0.0, 3.01, PERIOD)
     u = t / t[-1]
-    x = 50.0 * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    x = 50.0 * minimum_jerk(u)
     still = PlannedStroke("0", t, np.column_stack([x, 0 * x, 0 * x]), None)
     limits = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
     plan = make(still, PERIOD, 1.0, limits, (servo.position, servo.rotation), 20.0)
@@ -83,7 +85,7 @@ def test_no_lateness_is_rounded_onto_its_bound(late, words):
     clock = Stalling(late, asleep=True)
     servo = FakeServo(clock, 0.2)
     settings = drag_settings(tool_check=1000.0)
-    ending = Recorder(servo, FakeSensor(clock), clock, WEIGHTLESS, settings, 3.0).run()
+    ending = Recorder(servo, StreamingSensor(clock), clock, WEIGHTLESS, settings, 3.0).run()
     assert words in ending.reason
 
 
@@ -95,7 +97,7 @@ def test_an_arm_that_is_dragged_by_its_own_teaching_waits_for_nobody():
     clock = Stalling(0.53, asleep=True)
     servo = Led(clock, LOOKAHEAD)
     settings = drag_settings(tool_check=1000.0, drag="builtin")
-    sensor = FakeSensor(clock)
+    sensor = StreamingSensor(clock)
     sensor_tool = replace(WEIGHTLESS)
     loop = Recorder(servo, sensor, clock, sensor_tool, settings, 3.0)
     assert loop.run().reason == "duration"

@@ -9,7 +9,8 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.simulation.mock import PEN
-from tests.control.drag_fakes import FakeSensor, FakeServo, QueueServo, drag_settings
+from tests.control.drag_fakes import FakeServo, QueueServo, drag_settings
+from tests.control.fake_sensors import StreamingSensor
 
 # A sensor in the TCP with nothing on it senses the wrench that moves the tool.
 WEIGHTLESS = replace(PEN, tcp_position=PEN.sensor_position, weight=0.0, zero=np.zeros(6))
@@ -28,7 +29,7 @@ def bench(
     **options,
 ):
     clock = clock or SimulatedClock()
-    sensor, servo = FakeSensor(clock), kind(clock)
+    sensor, servo = StreamingSensor(clock), kind(clock)
     # Pulled from the first sample on, the tool would be taken for another one.
     settings = drag_settings(**{"tool_check": 1000.0} | options)
     recorder = Recorder(servo, sensor, clock, tool, settings, longest, signals, asked_to_end)
@@ -430,8 +431,9 @@ def test_an_arm_that_cannot_be_left_is_a_failure_with_its_recording(deed):
     recorder, sensor, servo = bench()
     setattr(servo, deed, unreachable)
     ending = recorder.run()
-    assert ending.reason == "fake: does not answer"
-    assert isinstance(ending.failure, InstrumentError)
+    told = {"stop": "THE ARM MAY STILL MOVE: it could not be told to stop: ", "close": ""}
+    assert ending.reason.startswith(f"{told[deed]}fake: does not answer")
+    assert isinstance(ending.error(), InstrumentError)
     assert len(recorder.log) == 101
     assert sensor.closed == 1
 
@@ -448,7 +450,7 @@ def test_the_first_failure_is_the_one_told():
 
 def test_a_defect_is_raised_but_the_arm_is_stopped_and_the_log_kept():
     recorder, sensor, servo = bench()
-    servo.mode = lambda t: "ready" if t < 1.0 else 1 / 0
+    recorder._asked_to_end = lambda: len(recorder.log) == 45 and 1 / 0
     with pytest.raises(ZeroDivisionError):
         recorder.run()
     assert servo.calls[-2:] == ["stop", "close"]
@@ -528,7 +530,7 @@ def test_a_robot_without_drag_teaching_cannot_be_dragged_by_its_own():
 def test_a_hindrance_brakes_and_is_what_the_recording_ends_with():
     full = InstrumentError("demo.journal: No space left on device")
     clock = SimulatedClock()
-    sensor, servo = FakeSensor(clock), FakeServo(clock)
+    sensor, servo = StreamingSensor(clock), FakeServo(clock)
     recorder = Recorder(
         servo,
         sensor,

@@ -9,20 +9,11 @@ from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import Sample, SensorInfo
 from dmpcli.simulation.mock import PEN, PEN_DOWN
 from dmpcli.spatial import wrench
+from tests.control.fake_sensors import BatchSensor
 
 INFO = SensorInfo("fake", 100.0, np.array([100.0, 100.0, 100.0, 10.0, 10.0, 10.0]))
 UNKNOWN = replace(PEN, weight=0.0, zero=None)
 LEVEL = np.eye(3)
-
-
-class FakeSensor:
-    """Hands out one batch after the other."""
-
-    def __init__(self, *batches):
-        self.batches = list(batches)
-
-    def poll(self):
-        return self.batches.pop(0) if self.batches else []
 
 
 def sample(t, force=0.0, healthy=True, torque=0.0, seq=7):
@@ -30,7 +21,7 @@ def sample(t, force=0.0, healthy=True, torque=0.0, seq=7):
 
 
 def sensing(*batches, rate=100.0, period=0.02):
-    return Sensing(FakeSensor(*batches), INFO, rate, period, SimulatedClock())
+    return Sensing(BatchSensor(*batches), INFO, rate, period, SimulatedClock())
 
 
 UNBELIEVABLE = [

@@ -11,18 +11,11 @@ from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.rotations import from_euler
+from tests.control.fake_sensors import BatchSensor
 from tests.control.streaming_fakes import START, plan, stroke
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)
-
-
-class FakeSensor:
-    def __init__(self, *batches):
-        self.batches = list(batches)
-
-    def poll(self):
-        return self.batches.pop(0) if self.batches else []
 
 
 INFO = SensorInfo("fake", 100.0, np.full(6, 100.0))
@@ -41,7 +34,7 @@ def turned(sensed, rotation):
 
 
 def touch(*batches):
-    sensor = FakeSensor(*batches)
+    sensor = BatchSensor(*batches)
     return ForceInput(Sensing(sensor, INFO, 100.0, PERIOD, SimulatedClock()), turned)
 
 

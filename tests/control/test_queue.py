@@ -105,8 +105,18 @@ def test_every_set_point_of_the_plan_is_sent_once_in_order(late):
     np.testing.assert_array_equal(rows.numbers("sent")[:450], expected)
 
 
+def held(made, count):
+    """Wait at its end for the arm, which comes one look-ahead later."""
+    more = {
+        name: np.concatenate([values, np.repeat(values[-1:], count, axis=0)])
+        for name in ("t", "position", "rotation")
+        for values in [getattr(made, name)]
+    }
+    return dataclasses.replace(made, **more)
+
+
 def test_several_plans_follow_each_other():
-    first = plan(stroke(duration=2.0))
+    first = held(plan(stroke(duration=2.0)), 5)
     end = (first.position[-1], first.rotation[-1])
     second = dataclasses.replace(plan(stroke(duration=2.0), start=end, approach=100.0), id="1")
     loop, outcome, servo = run({99: 0.045, 102: 0.045}, first, then=[second])

@@ -12,8 +12,9 @@ from dmpcli.control.force_tracking import ForceInput, ForceTracker
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InstrumentError, RefusedError
-from dmpcli.instruments.protocols import Sample, SensorInfo
+from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.spatial.rotations import exp
+from tests.control.fake_sensors import PolledSensor
 from tests.control.streaming_fakes import (
     PEN_DOWN,
     START,
@@ -31,18 +32,6 @@ PERIOD = 0.02
 NOTHING = np.zeros(6)
 
 
-class FakeSensor:
-    """A sample with every poll, except where `silent`; `wrench` is what it senses."""
-
-    def __init__(self, clock, wrench=NOTHING, rate=100.0):
-        self.clock, self.wrench, self.silent = clock, wrench, False
-
-    def poll(self):
-        if self.silent:
-            return []
-        return [Sample(self.clock.now(), 1, np.array(self.wrench, dtype=float), True, 0)]
-
-
 class Bench:
     def __init__(self, made=None, jumps=None, at=None, limits=WIDE, presses=False, **servo):
         self.plan = plan() if made is None else made
@@ -50,7 +39,7 @@ class Bench:
         self.servo = FakeServo(self.clock, at=at, **servo)
         self.interruption = Interruption()
         arm = ReadyArm(self.servo, self.servo.info, self.clock)
-        self.sensor = FakeSensor(self.clock)
+        self.sensor = PolledSensor(self.clock)
         self.loop = ServoLoop(self.plan, limits, WATCH, arm, self.touch() if presses else None)
 
     def touch(self):
@@ -332,7 +321,7 @@ def test_an_arm_that_cannot_be_stopped_is_a_failure_with_its_rows():
     bench = Bench()
     bench.servo.stop = unreachable
     outcome = bench.run()
-    assert outcome.reason == "fake: does not answer"
+    assert "could not be told to stop: fake: does not answer" in outcome.reason
     assert isinstance(outcome.failure, InstrumentError)
     assert len(bench.rows) > 500
 

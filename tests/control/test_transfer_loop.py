@@ -11,7 +11,8 @@ from dmpcli.control.signals import Interruption
 from dmpcli.planning import transfers
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
-from tests.control.streaming_fakes import PEN_DOWN, WIDE, FakeClock, FakeServo, minimum_jerk
+from tests.control.streaming_fakes import PEN_DOWN, WIDE, FakeClock, FakeServo
+from tests.minimum_jerk import minimum_jerk
 
 PERIOD = 0.02
 WAYS = TransferOptions(20.0, 100.0, 50.0, 20.0, settling=10)

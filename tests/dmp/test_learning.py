@@ -9,6 +9,7 @@ from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
 from tests.dmp.strokes import HEIGHT, circle, paper_stroke
+from tests.minimum_jerk import minimum_jerk
 
 
 def height(reproduction):
@@ -82,7 +83,7 @@ def test_a_stroke_that_begins_in_motion_keeps_its_initial_velocity():
 def test_a_straight_line_fits_and_has_no_wave():
     t = np.linspace(0, 5, 251)
     r = t / 5
-    s = 10 * r**3 - 15 * r**4 + 6 * r**5
+    s = minimum_jerk(r)
     position = np.array([1.0, 2.0, 3.0]) + np.outer(80 * s, [0.6, 0.0, 0.8])
     result = fit([SmoothedStroke(t, position)], FitOptions())
     assert result.reproductions[0].rms < 0.05

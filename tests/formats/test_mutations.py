@@ -1,5 +1,7 @@
-"""Importers take a damaged file or refuse it: no traceback, no hang; benchmarks/mutations.py has
-20,000 of each."""
+"""Importers take a damaged file or refuse it: no traceback, no hang.
+
+benchmarks/mutated_imports.py has 20,000 of each.
+"""
 
 import pytest
 

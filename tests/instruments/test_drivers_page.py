@@ -126,11 +126,11 @@ def test_the_example_says_what_is_wrong_as_the_page_asks(acme):
     robot.close()
 
 
-def test_the_old_place_of_the_protocol_says_where_it_is_now(monkeypatch):
-    monkeypatch.delitem(sys.modules, "dmpcli.instruments.drivers", raising=False)
+def test_the_old_place_of_the_protocol_says_where_it_is_now():
+    old = importlib.import_module("dmpcli.instruments.drivers")
     with pytest.warns(DeprecationWarning, match=r"is dmpcli\.instruments\.driver_protocol now"):
-        old = importlib.import_module("dmpcli.instruments.drivers")
-    assert old.Declaration is driver_protocol.DriverInfo
+        declaration = old.Declaration
+    assert declaration is driver_protocol.DriverInfo
     assert old.DriverState is driver_protocol.DriverState
     assert old.ServoDriver is driver_protocol.ServoDriver
 

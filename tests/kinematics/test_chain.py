@@ -51,3 +51,20 @@ def test_the_jacobian_is_the_derivative_of_the_chain():
             p0, R0 = chain.forward(EC66, behind)
             assert J[:3, i] == pytest.approx((p1 - p0) / (2 * step), abs=1e-5)
             assert J[3:, i] == pytest.approx(log(R1 @ R0.T) / (2 * step), abs=1e-8)
+
+
+def test_a_moving_point_has_the_velocity_of_the_jacobian_and_of_a_small_step():
+    rng = np.random.default_rng(3)
+    arm, tip = models.model("ec66"), np.array([10.0, -20.0, 130.0])
+    for _ in range(20):
+        q, speeds = rng.uniform(-2.0, 2.0, (2, 6))
+        position, rotation, velocity = chain.forward_moving(arm, q, speeds, tip)
+        np.testing.assert_array_equal(position, chain.forward_one(arm, q)[0])
+        np.testing.assert_array_equal(rotation, chain.forward_one(arm, q)[1])
+        flange = chain.jacobian(arm, q) @ speeds
+        expected = flange[:3] + np.cross(flange[3:], rotation @ tip)
+        np.testing.assert_allclose(velocity[:3], expected, atol=1e-9)
+        np.testing.assert_allclose(velocity[3:], flange[3:], atol=1e-12)
+        later = chain.forward_one(arm, q + 1e-6 * speeds)
+        moved = (later[0] + later[1] @ tip - position - rotation @ tip) / 1e-6
+        np.testing.assert_allclose(velocity[:3], moved, atol=0.01)

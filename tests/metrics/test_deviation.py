@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from dmpcli.metrics.deviation import Taught, nearest_distance, nearest_rms
 
 
-def brute(point, polyline):
-    best = np.inf
+def brute(points, polyline):
+    """Distance of each point to the nearest of all segments, one segment after the other."""
+    best = np.full(len(points), np.inf)
     for a, b in itertools.pairwise(polyline):
         length = np.dot(b - a, b - a)
-        share = 0.0 if length == 0 else min(1.0, max(0.0, np.dot(point - a, b - a) / length))
-        best = min(best, np.linalg.norm(point - a - share * (b - a)))
+        share = np.clip((points - a) @ (b - a) / (length or 1.0), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * (b - a), axis=1))
     return best
 
 
@@ -31,7 +32,7 @@ def test_nearest_distance_is_brute_forces(seed, corners, count, d):
     polyline = 800 + 100 * rng.standard_normal((corners, d))
     points = 800 + 100 * rng.standard_normal((count, d))
     points[0] = polyline[0]
-    expected = [brute(p, polyline) for p in points]
+    expected = brute(points, polyline)
     assert nearest_distance(points, polyline) == pytest.approx(expected, abs=1e-9)
 
 
@@ -40,7 +41,7 @@ def test_long_files_are_done_in_blocks_with_the_same_result():
     polyline = np.cumsum(rng.standard_normal((3000, 3)), axis=0)
     points = rng.standard_normal((900, 3)) * 30
     whole = nearest_distance(points, polyline)
-    assert whole[::97] == pytest.approx([brute(p, polyline) for p in points[::97]], abs=1e-9)
+    assert whole[::97] == pytest.approx(brute(points[::97], polyline), abs=1e-9)
 
 
 def test_nearest_rms_of_a_parallel_line_is_the_gap():
@@ -71,6 +72,6 @@ def test_many_strokes_together_are_as_far_as_each_from_every_segment(seed, corne
         np.arange(15.0), strokes.transpose(2, 0, 1), factors
     )
     for i, (stroke, factor) in enumerate(zip(strokes, factors, strict=True)):
-        far = np.array([brute(p, taught * [factor, 1.0, 1.0]) for p in stroke])
+        far = brute(stroke, taught * [factor, 1.0, 1.0])
         assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
         assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from dmpcli.metrics import motion
+from tests.minimum_jerk import minimum_jerk
 
 
 def log_dimensionless_jerk(t, position, **more):
@@ -17,7 +18,7 @@ def spectral_arc_length(t, position, **more):
 
 def reach(n=1001, T=1.0, amplitude=100.0):
     s = np.linspace(0, 1, n)
-    x = amplitude * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    x = amplitude * minimum_jerk(s)
     return T * s, np.column_stack([x, 0.5 * x, 0 * x])
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import find_peaks
 
 from dmpcli.metrics.wave_height import lateral, stroke_wave, wave_heights
+from tests.minimum_jerk import minimum_jerk
 
 START = np.array([-551.030, 131.399, -17.560])
 GOAL = np.array([-660.021, 130.034, -17.538])
@@ -15,7 +16,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def stroke(height=49.979, periods=1.0, n=501, start=START, goal=GOAL, normal=UP):
     s = np.linspace(0.0, 1.0, n)
-    u = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    u = minimum_jerk(s)[:, None]
     v = np.cross(normal, goal - start)
     v /= np.linalg.norm(v)
     return start + u * (goal - start) + 0.5 * height * np.sin(2 * np.pi * periods * u) * v

@@ -17,6 +17,7 @@ from dmpcli.records import tool as tool_file
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.mock import PEN
 from tests.commands.virtual_lab import DMPCLI, Lab
+from tests.minimum_jerk import minimum_jerk
 
 pytestmark = pytest.mark.slow
 
@@ -179,7 +180,7 @@ def line(folder: Path) -> Path:
     """Write a trajectory: 60 mm across the table in 3 s from where the pen is parked, and rest."""
     t = np.arange(151) / 50.0
     s = t / t[-1]
-    share = 10 * s**3 - 15 * s**4 + 6 * s**5
+    share = minimum_jerk(s)
     position = PARKED + np.outer(share, [-60.0, 0.0, 0.0])
     pose = np.column_stack([position, np.tile([np.pi, 0.0, 0.0], (len(t), 1))])
     columns = {"id": np.full(len(t), "line", dtype=object), "t": t}

@@ -3,7 +3,8 @@ import pytest
 
 from dmpcli.planning.plan import gap
 from dmpcli.spatial import rotations
-from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, minimum_jerk, plan, sine, stroke
+from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, sine, stroke
+from tests.minimum_jerk import minimum_jerk
 
 
 def test_a_file_at_the_servo_rate_is_streamed_unchanged():

@@ -13,7 +13,8 @@ from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import transfers
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
-from tests.control.streaming_fakes import PEN_DOWN, WIDE, minimum_jerk
+from tests.control.streaming_fakes import PEN_DOWN, WIDE
+from tests.minimum_jerk import minimum_jerk
 
 PERIOD = 0.02
 WAYS = TransferOptions(20.0, 100.0, 50.0, 20.0, settling=3)

@@ -3,9 +3,11 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tests.minimum_jerk import minimum_jerk
+
 T = np.linspace(0.0, 8.0, 201)
 _U = T / 8.0
-_S = 10 * _U**3 - 15 * _U**4 + 6 * _U**5
+_S = minimum_jerk(_U)
 XYZ = np.column_stack([-550 - 110 * _S, 130 + 24 * np.sin(2 * np.pi * _S), -17.5 + 0 * _S])
 R = Rotation.from_euler(
     "XYZ", np.column_stack([np.full(T.size, np.pi), 0.4 * np.sin(0.7 * T), 0.9 * np.sin(0.4 * T)])

@@ -8,6 +8,7 @@ import pytest
 
 from dmpcli.errors import InputError
 from dmpcli.records import file_io
+from dmpcli.records.atomic_text import growing
 
 
 def test_write_replaces_whole_and_leaves_no_temporary(tmp_path):
@@ -104,3 +105,64 @@ def test_a_link_is_followed_and_a_named_pipe_is_written_to(tmp_path):
     assert os.read(reader, 10) == b"data"
     os.close(reader)
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+def test_what_cannot_be_made_again_is_kept_beside_what_appeared(tmp_path):
+    target = tmp_path / "run.parquet"
+    assert file_io.write_new(target, b"mine") == target
+    assert file_io.write_new(target, b"second") == tmp_path / "run-1.parquet"
+    assert file_io.write_new(target, b"third") == tmp_path / "run-2.parquet"
+    assert target.read_bytes() == b"mine"
+    assert sorted(os.listdir(tmp_path)) == ["run-1.parquet", "run-2.parquet", "run.parquet"]
+
+
+def test_a_file_system_without_links_replaces_nothing_either(tmp_path, monkeypatch):
+    def link(*_, **__):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", link)
+    target = tmp_path / "run.parquet"
+    target.write_bytes(b"theirs")
+    assert file_io.write_new(target, b"mine") == tmp_path / "run-1.parquet"
+    assert target.read_bytes() == b"theirs"
+    assert (tmp_path / "run-1.parquet").read_bytes() == b"mine"
+    assert len(os.listdir(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("write", [file_io.write, file_io.write_new])
+def test_a_temporary_follows_no_link_that_somebody_has_laid(write, tmp_path, monkeypatch):
+    """Whatever the temporary's name: a link that lies there already is not written through."""
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"precious")
+    opened = os.open
+
+    def lay_link_first(path, flags, *mode, **more):
+        if str(path).endswith(".tmp"):
+            os.symlink(victim, path)
+        return opened(path, flags, *mode, **more)
+
+    monkeypatch.setattr(os, "open", lay_link_first)
+    with pytest.raises(InputError, match="cannot be written"):
+        write(tmp_path / "out", b"new")
+    assert victim.read_bytes() == b"precious"
+
+
+def test_the_name_of_a_temporary_cannot_be_foreseen(tmp_path):
+    trap = tmp_path / f".out.{os.getpid()}.tmp"
+    trap.symlink_to(tmp_path / "victim")
+    file_io.write(tmp_path / "out", b"new")
+    assert not (tmp_path / "victim").exists()
+    with growing(tmp_path, ["rows.csv"]) as (stream,):
+        stream.write("1")
+    assert (tmp_path / "rows.csv").read_text() == "1"
+    assert not (tmp_path / "victim").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["..", "../part-00000.parquet", "/etc/passwd", "part-00000.parquet/..", "pairs.parquet",
+             "part-00000.parquet\0", "part-1.parquet", ""]
+)  # fmt: skip
+def test_a_part_of_a_batch_is_one_of_its_folder(name, tmp_path):
+    with pytest.raises(InputError, match="names the part"):
+        file_io.part_in(tmp_path, name, "pairs.parquet")
+    assert file_io.part_in(tmp_path, "part-00012.parquet", "") == tmp_path / "part-00012.parquet"

@@ -9,6 +9,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import record, schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.trajectory_reader import rows_by_id, stored
+from tests.minimum_jerk import minimum_jerk
 
 N = 101
 
@@ -18,7 +19,7 @@ def trajectory(normal=None, named=None, t=None, angles=None, ids=None):
     columns = {
         "id": np.array(ids or ["a"] * N, dtype=object),
         "t": 2.0 * s if t is None else t,
-        "x": -600.0 + 50.0 * (10 * s**3 - 15 * s**4 + 6 * s**5),
+        "x": -600.0 + 50.0 * minimum_jerk(s),
         "y": 130.0 + 0.0 * s,
         "z": -17.0 + 0.0 * s,
     }

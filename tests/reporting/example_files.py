@@ -8,6 +8,7 @@ from dmpcli.records.record import Provenance, Record, encode
 from dmpcli.records.schemas import POSITION, suffixed
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.spatial import rotations
+from tests.minimum_jerk import minimum_jerk
 
 START, GOAL = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
 NEW_START, NEW_GOAL = np.array(GENERALIZATION.start), np.array(GENERALIZATION.goal)
@@ -17,7 +18,7 @@ UP = np.array([0.0, 0.0, 1.0])
 def wave(start=START, goal=GOAL, height=49.979, periods=1.0, n=501, normal=UP):
     """Sine across the start-goal line, minimum-jerk along it, shape (n, 3)."""
     s = np.linspace(0.0, 1.0, n)
-    u = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    u = minimum_jerk(s)[:, None]
     v = np.cross(normal, goal - start)
     return (
         start
@@ -129,7 +130,7 @@ def fillet_wave(height=50.0, n=501):
     """Sine wave along the rounded side at the paper's curved pair: positions and normals."""
     start, goal = off_fillet(CURVED_START), off_fillet(CURVED_GOAL)
     s = np.linspace(0.0, 1.0, n)
-    u = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    u = minimum_jerk(s)[:, None]
     way = goal - start
     across = np.array([way[1], -way[0]]) / np.linalg.norm(way)
     return on_fillet(start + u * way + 0.5 * height * np.sin(2 * np.pi * u) * across)

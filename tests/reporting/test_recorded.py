@@ -15,6 +15,7 @@ from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke_measures import row_of
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.surfaces.sphere import Sphere
+from tests.minimum_jerk import minimum_jerk
 from tests.reporting.example_files import GOAL, START, trajectory, wave
 
 RADIUS = 200.0
@@ -30,7 +31,7 @@ def recording(path=None, dt=0.02, noise=0.0):
 def on_sphere(height=30.0, n=801):
     """Two half waves across a great circle of the sphere, 120 mm long: u, v in closed form."""
     s = np.linspace(0.0, 1.0, n)
-    u = 10 * s**3 - 15 * s**4 + 6 * s**5
+    u = minimum_jerk(s)
     a, b = (120.0 * u - 60.0) / RADIUS, 0.5 * height * np.sin(2 * np.pi * u) / RADIUS
     up = np.stack([np.cos(b) * np.sin(a), np.sin(b), np.cos(b) * np.cos(a)], axis=-1)
     return RADIUS * up + SPHERE.centre, np.stack([120.0 * u, RADIUS * b], axis=-1)

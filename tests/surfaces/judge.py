@@ -67,7 +67,9 @@ class Judge:
 
     def _barycentric(self, face, point):
         a, b, c = self.mesh.corners[face]
-        share = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), point - a, rcond=None)[0]
+        p, q, r = b - a, c - a, point - a
+        pp, pq, qq, rp, rq = p @ p, p @ q, q @ q, r @ p, r @ q
+        share = np.array([qq * rp - pq * rq, pp * rq - pq * rp]) / (pp * qq - pq * pq)
         share = np.clip([1.0 - share.sum(), *share], 1e-9, 1.0)
         return share / share.sum()
 
@@ -211,6 +213,11 @@ def smooth(judge, count, rng):
                 break
         else:
             found.append(pairs)
+    return joined(found)
+
+
+def joined(found):
+    """Return pairs one after the other."""
     return Pairs(
         *(np.concatenate([getattr(p, name) for p in found]) for name in Pairs.__dataclass_fields__)
     )
@@ -278,12 +285,11 @@ class Verdict:
     unconfirmed: list
 
 
-def verdict(judge, pairs):
-    """Draw waves on pairs and judge them all."""
-    drawn = draw(judge, pairs)
+def verdict(judge, pairs, drawn, rows):
+    """Judge the waves that were drawn on some of the pairs."""
     status, charts = drawn.lift.status, drawn.charts
     unconfirmed = []
-    for i in np.flatnonzero(status != Status.DRAWN):
+    for i in rows[status[rows] != Status.DRAWN]:
         what = Status(int(status[i]))
         heading, length = charts.centre.direction[i], charts.lengths[i]
         stroke = drawn.coordinates[i].copy()
@@ -293,16 +299,22 @@ def verdict(judge, pairs):
             stroke[:, 0] *= length / charts.lengths[i]
         if not judge.confirms(what, pairs, i, heading, length, stroke):
             unconfirmed.append((int(i), what.name))
+    status = status[rows]
     return Verdict(
         len(status),
         int((status == Status.DRAWN).sum()),
-        dict(Counter(word for word in drawn.wrong if word)),
+        dict(Counter(word for word in drawn.wrong[rows] if word)),
         dict(Counter(Status(int(one)).name for one in status if one != Status.DRAWN)),
         unconfirmed,
     )
 
 
 def verdicts(mesh, count, seed):
-    """Judge so many pairs on smooth patches, and as many traced anywhere."""
+    """Judge so many pairs on smooth patches, and as many traced anywhere; drawn together."""
     judge, rng = Judge(mesh), np.random.default_rng(seed)
-    return verdict(judge, smooth(judge, count, rng)), verdict(judge, traced(judge, count, rng))
+    pairs = joined([smooth(judge, count, rng), traced(judge, count, rng)])
+    drawn, split = draw(judge, pairs), len(pairs.length) - count
+    return tuple(
+        verdict(judge, pairs, drawn, rows)
+        for rows in np.split(np.arange(len(pairs.length)), [split])
+    )

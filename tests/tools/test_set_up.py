@@ -84,14 +84,20 @@ def whole(tmp_path_factory):
     return place
 
 
-@pytest.fixture
-def pip(whole, monkeypatch):
-    """What `set_up` does to install into an environment; returns what it ends with."""
-    monkeypatch.chdir(whole.folder)
-    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+@pytest.fixture(scope="module")
+def set_up():
+    """The tool itself."""
     spec = importlib.util.spec_from_file_location("set_up", TOOLS / "set_up.py")
     set_up = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(set_up)
+    return set_up
+
+
+@pytest.fixture
+def pip(set_up, whole, monkeypatch):
+    """What `set_up` does to install into an environment; returns what it ends with."""
+    monkeypatch.chdir(whole.folder)
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
 
     def refused(*words):
         with pytest.raises(set_up.SetUpError) as caught:
@@ -202,3 +208,21 @@ def test_a_difficult_place_and_what_a_shell_says_to_pip_do_no_harm(tmp_path):
     assert not Path(elsewhere).exists()
     pip = subprocess.run([folder / ".venv/bin/pip", "--version"], capture_output=True, check=True)
     assert b"pip" in pip.stdout
+
+
+@pytest.mark.parametrize(("index", "asked"), [("", 1), ("https://more", 2)])
+def test_requirements_are_resolved_in_another_index_where_the_first_does_not_do(
+    set_up, monkeypatch, index, asked
+):
+    calls = []
+
+    def pip(venv, *words):
+        calls.append(words)
+        raise set_up.SetUpError("the package index has no wheel of torch")
+
+    monkeypatch.setattr(set_up, "pip", pip)
+    with pytest.raises(set_up.SetUpError, match="no wheel of torch"):
+        set_up.packages(Path("venv"), Path("some.txt"), "open", index)
+    assert len(calls) == asked
+    assert not {"--no-deps", "--only-binary"} & set(sum(calls, ()))
+    assert calls[-1][-2:] == ("--extra-index-url", "https://more") or not index

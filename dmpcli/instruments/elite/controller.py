@@ -110,6 +110,7 @@ class Controller:
         self._monitor.open()
         if s.clear_alarm and state in (_ERROR, _COLLISION):
             self.requests.deed("clearAlarm")
+            self._await_cleared()
         told, heard = self.requests.joints("get_joint_pos"), self.fresh_joints()
         away = np.abs(told - heard)
         if not (away <= _SAME).all():
@@ -132,11 +133,14 @@ class Controller:
         powered : bool
             Whether servos that are off forbid motion; before a start they may be switched on yet.
         """
-        report = self._monitor.newest()
-        mode, detail = self._mode(report, powered or self._settings.servo == "manual")
+        report, latched = self._monitor.newest(), self._monitor.latched
+        mode, detail = self._mode(latched or report, powered or self._settings.servo == "manual")
+        if latched is not None and not report.alarming:
+            detail = f"{detail + ', ' if detail else ''}shown for a moment, and gone again"
         # Once, for the check against the joints; later it would be older than they are.
         reported, self._reported = self._reported, None
-        return DriverState(report.t, mode, self._degrees(report), reported, detail)
+        busy = report.state == _PLAY
+        return DriverState(report.t, mode, self._degrees(report), reported, detail, busy)
 
     def fresh_joints(self, patience: float | None = None) -> Floats:
         """Actual joint angles of a frame that comes from now on, degrees.
@@ -174,7 +178,13 @@ class Controller:
         InstrumentError
             It does not do what is asked.
         """
-        ask = self.requests
+        ask, latched = self.requests, self._monitor.latched
+        if latched is not None:
+            shown, detail = self._mode(latched, powered=False)
+            raise RefusedError(
+                f"{self.name}: {shown}{f' ({detail})' if detail else ''} since it was connected; "
+                "make sure that its cause is gone, and start again"
+            )
         mode = ask.whole("getRobotMode", 0, _REMOTE)
         if mode != _REMOTE:
             raise RefusedError(f"{self.name}: in {_MODES[mode]} mode; turn the key to remote")
@@ -271,6 +281,14 @@ class Controller:
             if self._clock.now() > latest:
                 raise InstrumentError(f"{self.name}: its servos do not come on; see its pendant")
             self._clock.sleep_until(self._clock.now() + _POWER_STEP)
+
+    def _await_cleared(self) -> None:
+        """Wait for a frame without the alarm that was cleared; what shows one later latches."""
+        latest = self._clock.now() + self._settings.patience
+        while self._monitor.newest(after=self._clock.now()).alarming:
+            if self._clock.now() > latest:
+                return  # the state says it from now on
+        self._monitor.forget()
 
     def _await_stop(self) -> None:
         """Refuse to cut into the controller's own motion; what stops just now is waited for."""

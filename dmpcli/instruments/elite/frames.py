@@ -54,6 +54,9 @@ FRAME = np.dtype(
 # No joint of an EC arm turns further; an angle beyond is no angle in degrees or radians.
 _LARGEST_ANGLE = 720.0
 
+ALARMING = (2, 4, 5)
+"""States, as getRobotState answers, in which something has stopped the arm."""
+
 _HEAD = SIZE.to_bytes(4, "big")
 _FLAGS = ("servo_ready", "motors_synchronised", "collision", "estop")
 
@@ -88,6 +91,11 @@ class Report:
     motors_synchronised: bool
     collision: bool
     estop: bool
+
+    @property
+    def alarming(self) -> bool:
+        """Whether it shows an emergency stop, a collision or an alarm."""
+        return self.estop or self.collision or self.state in ALARMING
 
 
 def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:

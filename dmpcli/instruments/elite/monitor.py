@@ -1,15 +1,27 @@
-"""The EC controller's monitor port: a frame about every 8 ms; the newest one is kept."""
+"""The EC controller's monitor port: a frame about every 8 ms; the newest one is kept.
+
+What must not be missed is kept too: an emergency stop, a collision or an alarm that a single frame
+shows, between two looks of however slow a loop.
+"""
 
 import contextlib
 import math
 import socket
 import threading
+from collections import deque
 from dataclasses import replace
 
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments import sockets
 from dmpcli.instruments.elite.frames import MATCHING_WORD, SIZE, FrameBuffer, Report
 from dmpcli.instruments.protocols import Clock
+
+# What a frame tells of between one and the next, s, where it cannot be told from the first frames.
+_NOMINAL = 0.008
+# Of so many frames that interval is taken, and of so many what it is now.
+_FIRST, _LAST = 64, 256
+# The first in which both clocks agree to this share are believed; a smaller slew is not told apart.
+_AGREE, _SLEWS = 0.01, 0.003
 
 # Two clocks may drift apart by this share; a delay that grows more slowly is not seen.
 _DRIFT = 5e-4
@@ -28,6 +40,8 @@ class Delay:
 
     def __init__(self) -> None:
         self.value = 0.0
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_LAST)
+        self._interval = 0.0
         self._least, self._t, self._stamp = math.inf, 0.0, -math.inf
 
     def undone(self, report: Report) -> float:
@@ -45,8 +59,38 @@ class Delay:
         else:
             self._least = min(offset, self._least + _DRIFT * (report.t - self._t))
         self._t, self._stamp = report.t, stamp
+        self._recent.append((report.t, stamp))
+        if self._interval == 0.0 and len(self._recent) == _FIRST:
+            here, there = self._steps()
+            self._interval = here if abs(there - here) <= _AGREE * here else _NOMINAL
         self.value = offset - self._least
         return report.t - self.value
+
+    @property
+    def slew(self) -> float | None:
+        """By which share the controller's clock runs slow; None where the connection lags instead.
+
+        Either lets its time stamps fall behind. A clock that is slow writes stamps that lie closer
+        than the frames are apart; a connection that lags hands out frames further apart than they
+        were made.
+        """
+        if len(self._recent) < 3:
+            return None
+        # A delay that has come at once is no slew: that grows evenly.
+        ends = self._recent[0], self._recent[len(self._recent) // 2], self._recent[-1]
+        behind = [t - stamp for t, stamp in ends]
+        if min(behind[1] - behind[0], behind[2] - behind[1]) < 0.25 * (behind[2] - behind[0]):
+            return None
+        here, there = self._steps()
+        made = self._interval or _NOMINAL
+        slow = 1.0 - there / here if here > 0.0 else 0.0
+        return slow if abs(there - made) > abs(here - made) and slow >= _SLEWS else None
+
+    def _steps(self) -> tuple[float, float]:
+        """Mean time between two frames by our clock and by the controller's, s."""
+        (t0, stamp0), (t1, stamp1) = self._recent[0], self._recent[-1]
+        count = len(self._recent) - 1
+        return (t1 - t0) / count, (stamp1 - stamp0) / count
 
 
 class Monitor:
@@ -84,6 +128,8 @@ class Monitor:
         self._gone = ""
         self._news = threading.Condition()
         self._newest: Report | None = None
+        self._arrived = 0.0  # when the newest one did, by our clock
+        self._latched: Report | None = None
         self._delay = Delay()
 
     def open(self) -> None:
@@ -127,6 +173,7 @@ class Monitor:
                     self._patience if patience is None else patience,
                 )
             report, gone, delay = self._newest, self._gone, self._delay.value
+            arrived, slew = self._arrived, self._delay.slew
         why = gone or ("silent" if delay <= self._oldest else f"its frames come {delay:.2f} s late")
         if self._frames.lost:
             why += f"; a frame {self._frames.fault}"
@@ -135,10 +182,30 @@ class Monitor:
         age = self._clock.now() - report.t
         waited_in_vain = after is not None and report.t <= after
         if gone or waited_in_vain or not age <= self._oldest:
+            if not gone and slew is not None and self._clock.now() - arrived <= self._oldest:
+                raise InstrumentError(
+                    f"{self._what}: its clock runs {100.0 * slew:.3g} % slow against this "
+                    f"computer's, and its time stamps have fallen {delay:.2f} s behind, while its "
+                    "frames come as ever; mend its clock, or let it be set while nothing moves"
+                )
             raise InstrumentError(
                 f"{self._what}: no new state for {age:.2f} s ({why}); check cable and power"
             )
         return report
+
+    @property
+    def latched(self) -> Report | None:
+        """The first report of an emergency stop, a collision or an alarm, since it was opened.
+
+        It stays, whatever later frames say: nobody may go on as if it had not been.
+        """
+        with self._news:
+            return self._latched
+
+    def forget(self) -> None:
+        """Let go of the latched report, once its cause was cleared on our own demand."""
+        with self._news:
+            self._latched = None
 
     def close(self) -> None:
         """Disconnect; may be called twice."""
@@ -172,7 +239,10 @@ class Monitor:
 
     def _take(self, report: Report) -> None:
         with self._news:
+            if self._latched is None and report.alarming:
+                self._latched = report
             # A controller that repeats itself is no news, however often it does so.
             if self._newest is None or report.timestamp != self._newest.timestamp:
+                self._arrived = report.t
                 self._newest = replace(report, t=self._delay.undone(report))
                 self._news.notify_all()

@@ -5,10 +5,12 @@ stands in the laboratory.
 """
 
 import http.client
+import io
 import socket
 import threading
 import time
 from dataclasses import dataclass
+from typing import Any
 
 from dmpcli.instruments.netft.settings import (
     CALIBRATION_SIZE,
@@ -125,7 +127,7 @@ class Box:
             with socket.create_connection((self.host, self.tcp), timeout=wait) as connection:
                 connection.sendall(READCALINFO)
                 while len(reply) < CALIBRATION_SIZE:
-                    connection.settimeout(_left(deadline))
+                    connection.settimeout(_left(deadline))  # each byte may be the last for long
                     part = connection.recv(CALIBRATION_SIZE - len(reply))
                     if not part:
                         break
@@ -136,8 +138,9 @@ class Box:
 
     def _get(self, path: str, deadline: float) -> bytes:
         try:
-            connection = http.client.HTTPConnection(self.host, self.http, timeout=_left(deadline))
-            try:
+            with socket.create_connection((self.host, self.http), _left(deadline)) as stream:
+                connection = http.client.HTTPConnection(self.host, self.http)
+                connection.sock = _Wire(stream, deadline)
                 connection.request("GET", path)
                 response = connection.getresponse()
                 # Redirects are how a box answers to a changed setting.
@@ -150,12 +153,45 @@ class Box:
                     page += part
                     if len(page) > _LARGEST_PAGE:
                         raise NoAnswerError(f"HTTP port {self.http}: {path} has no end")
-                    _left(deadline)
                 return page
-            finally:
-                connection.close()
         except (OSError, http.client.HTTPException) as error:
             raise NoAnswerError(f"HTTP port {self.http}: {_reason(error)}") from None
+
+
+class _Wire:
+    """A connection with one deadline for all that goes over it, as `HTTPConnection` uses a socket.
+
+    A socket's own time-out begins anew with each byte: a page that drips, or one interim answer
+    after the other, would hold a call for ever.
+    """
+
+    def __init__(self, stream: socket.socket, deadline: float) -> None:
+        self._socket, self._deadline = stream, deadline
+
+    def sendall(self, data: bytes) -> None:
+        self._socket.settimeout(_left(self._deadline))
+        self._socket.sendall(data)
+
+    def makefile(self, mode: str) -> io.BufferedReader:  # noqa: ARG002
+        return io.BufferedReader(_Incoming(self._socket, self._deadline))
+
+    def close(self) -> None:
+        """Leave it open: the answer is still read after `HTTPConnection` has done with it."""
+
+
+class _Incoming(io.RawIOBase):
+    """What comes in, until the deadline."""
+
+    def __init__(self, incoming: socket.socket, deadline: float) -> None:
+        super().__init__()
+        self._socket, self._deadline = incoming, deadline
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        self._socket.settimeout(_left(self._deadline))
+        return self._socket.recv_into(buffer)
 
 
 def _left(deadline: float) -> float:

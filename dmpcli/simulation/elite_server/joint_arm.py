@@ -135,9 +135,7 @@ class JointArm:
     @cached_property
     def posture(self) -> Posture:
         """Where flange and TCP are now."""
-        origins, frames = chain.frames(self.model, self.joints)
-        p, R = origins[6], frames[6]
-        tip = p + R @ self.tool.tcp_position
-        axes = frames[:6, :, 2]
-        velocity = self.speeds @ np.concatenate([np.cross(axes, tip - origins[:6]), axes], axis=1)
+        reach = self.tool.tcp_position
+        p, R, velocity = chain.forward_moving(self.model, self.joints, self.speeds, reach)
+        tip = p + R @ reach
         return Posture(p, R, tip, R @ self.tool.tcp_rotation, velocity)

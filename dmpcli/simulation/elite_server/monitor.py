@@ -42,8 +42,9 @@ def frame(controller: SimulatedController, milliseconds: int) -> bytes:
     """
     arm, euler = controller.arm, controller.habits.euler
     at = arm.posture
-    tip = pose_row(at.position, at.rotation, euler)
-    flange = pose_row(at.flange_position, at.flange_rotation, euler)
+    positions = np.array([at.position, at.flange_position])
+    rotations = np.array([at.rotation, at.flange_rotation])
+    tip, flange = pose_row(positions, rotations, euler).tolist()
     return _FRAME.pack(
         SIZE,
         milliseconds,
@@ -75,4 +76,4 @@ def frame(controller: SimulatedController, milliseconds: int) -> bytes:
 
 
 def _eight(six: Floats) -> list[float]:
-    return [*map(float, six), 0.0, 0.0]
+    return [*six.tolist(), 0.0, 0.0]

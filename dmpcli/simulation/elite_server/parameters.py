@@ -109,11 +109,11 @@ def matrix(angles: Floats, euler: Euler) -> Floats:
 
 
 def angles(rotation: Floats, euler: Euler) -> Floats:
-    """Three angles of a rotation matrix, rad."""
-    return to_euler(rotation) if euler == "xyz" else -to_euler(rotation.T)
+    """Three angles of each rotation matrix, rad; shapes (..., 3, 3) and (..., 3)."""
+    return to_euler(rotation) if euler == "xyz" else -to_euler(np.swapaxes(rotation, -1, -2))
 
 
 def pose_row(position: Floats, rotation: Floats, euler: Euler, degrees: bool = False) -> Floats:
-    """A pose as six numbers: mm, and rad or degrees; shape (6,)."""
+    """Each pose as six numbers: mm, and rad or degrees; shape (..., 6)."""
     turned = angles(rotation, euler)
-    return np.concatenate([position, np.degrees(turned) if degrees else turned])
+    return np.concatenate([position, np.degrees(turned) if degrees else turned], axis=-1)

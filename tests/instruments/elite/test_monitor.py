@@ -130,3 +130,57 @@ def test_what_sends_no_frames_is_no_monitor(robot):
     robot.sends_frames = False
     with pytest.raises(InstrumentError, match=r"sends no state \(silent\)"):
         opened(robot)
+
+
+@pytest.mark.parametrize(
+    "flag", [{"estop": 1}, {"collision": 1}, {"state": 2}, {"state": 4}, {"state": 5}]
+)
+def test_what_a_single_frame_shows_stays_whatever_comes_after(robot, flag):
+    monitor = opened(robot)
+    assert monitor.latched is None
+    stamp = monitor.newest().timestamp
+    # Even where its time stamp is none that is new.
+    for changes in ({}, flag | {"stamp": stamp}, {}):
+        (report,) = reports((monitor.newest().t, stamp))
+        monitor._take(decode(frame(**{"stamp": stamp} | changes), report.t))
+    assert not monitor.newest(after=MonotonicClock().now()).alarming
+    assert monitor.latched.alarming
+    monitor.forget()
+    assert monitor.latched is None
+    monitor.close()
+
+
+def slewed(share, agreed):
+    """A clock that runs slow by a share, after so many frames in which it does not."""
+    stamps = np.cumsum([8.0] * agreed + [8.0 * (1.0 - share)] * 400)
+    return [(100.0 + 0.008 * (k + 1), 5000 + round(s)) for k, s in enumerate(stamps)]
+
+
+@pytest.mark.parametrize("agreed", [0, 200])
+def test_a_clock_that_slews_is_told_from_a_connection_that_lags(agreed):
+    delay = Delay()
+    for report in reports(*slewed(0.05, agreed)):
+        delay.undone(report)
+    assert delay.value == pytest.approx(0.05 * 400 * 0.008, rel=0.05)
+    assert delay.slew == pytest.approx(0.05, abs=0.005)
+    lags = Delay()
+    arrivals = np.cumsum([0.008] * agreed + [0.0084] * 400)
+    for report in reports(*((100.0 + t, 5000 + 8 * k) for k, t in enumerate(arrivals))):
+        lags.undone(report)
+    assert lags.value > 0.1
+    assert lags.slew is None
+
+
+def test_a_clock_that_slews_is_said_to_and_not_called_silent(robot):
+    monitor = opened(robot, oldest=0.1)
+    robot.sends_frames = False
+    clock, now = monitor._clock, MonotonicClock().now()
+    begin = monitor.newest().timestamp
+    for t, stamp in slewed(0.05, 70):
+        monitor._take(decode(frame(stamp=begin + stamp), now + t - 100.0))
+    clock.now = lambda: now + t - 100.0 + 0.004
+    with pytest.raises(InstrumentError, match=r"its clock runs (4\.9\d*|5\.?\d*) % slow") as caught:
+        monitor.newest()
+    assert "silent" not in str(caught.value)
+    assert "cable" not in str(caught.value)
+    monitor.close()

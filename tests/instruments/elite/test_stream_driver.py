@@ -9,8 +9,9 @@ from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.elite import controller, stream_driver
 from dmpcli.instruments.elite.controller import Controller
+from dmpcli.instruments.elite.frames import FrameBuffer
 from dmpcli.instruments.elite.requests import Requests
-from tests.instruments.elite.scripted import HOME, WORD, Scripted, refusal
+from tests.instruments.elite.scripted import HOME, WORD, Scripted, frame, refusal
 
 READS = {
     "getRobotState",
@@ -228,6 +229,42 @@ def test_what_forbids_motion_is_a_mode_and_its_detail(robot, arm, monitor, mode,
     if mode != "ready":
         with pytest.raises(RefusedError, match=mode):
             guards.check_state(state)
+
+
+@pytest.mark.parametrize(
+    ("flag", "mode"), [({"estop": 1}, "emergency stop"), ({"collision": 1}, "protective stop")]
+)
+def test_a_flag_in_one_frame_is_seen_at_any_period_and_stays(robot, arm, flag, mode):
+    servo = arm()
+    servo.open()
+    servo.start(0.02)
+    (shown,) = FrameBuffer().feed(frame(**flag), servo._clock.now())
+    servo._driver._controller._monitor._take(shown)
+    servo._driver._controller.fresh_joints()
+    for _ in range(2):
+        state = servo.state()
+        assert state.mode == mode
+        assert "shown for a moment, and gone again" in state.detail
+    servo.stop()
+    begun = robot.methods().count("transparent_transmission_init")
+    with pytest.raises(RefusedError, match=f"{mode}.* since it was connected; make sure"):
+        servo.start(0.02)
+    assert robot.methods().count("transparent_transmission_init") == begun
+
+
+def test_an_alarm_that_was_cleared_on_demand_is_forgotten(robot, arm):
+    robot.monitor = {"state": 4}
+    robot.answers["getRobotState"] = lambda _: robot.monitor["state"]
+
+    def clear(_):
+        robot.monitor["state"] = 0
+        return True
+
+    robot.answers["clearAlarm"] = clear
+    servo = arm(clear_alarm="yes")
+    servo.open()
+    assert servo.state().mode == "ready"
+    servo.start(0.02)
 
 
 @pytest.mark.parametrize(

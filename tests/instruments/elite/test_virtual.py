@@ -131,6 +131,49 @@ def test_a_dropped_connection_stops_the_arm_over_a_new_one(bench, kind, mode):
 
 
 @pytest.mark.slow
+def test_an_arm_that_draws_on_after_its_link_is_gone_is_said_to(bench):
+    made = bench(mode="file")
+    loop, _ = made.loop(Playback, duration=8.0)
+    state = made.servo.state
+
+    def cut():
+        if len(loop.log) == 20:
+            made.service._robot.close()
+        return state()
+
+    made.servo.state = cut
+    outcome = loop.run(Interruption())
+    assert re.search("closed the connection|Broken pipe|reset by peer", outcome.reason)
+    assert outcome.error().exit_code == 4
+    last = str(outcome.error()).splitlines()[-1]
+    assert last.startswith("THE ARM MAY STILL MOVE: it could not be told to stop")
+    made.service._lab.controller.stop()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
+def test_a_controller_that_only_acknowledges_its_stop_is_found_out(bench, kind, mode):
+    made = bench(mode=mode)
+    loop, _ = made.loop(kind, duration=8.0)
+    controller, state = made.service._lab.controller, made.servo.state
+    interruption = Interruption()
+
+    def asked():
+        if len(loop.log) == 20:
+            for method in ("stop", "stop_trajectory", "tt_clear_servo_joint_buf"):
+                controller._methods[method] = lambda _: True
+            interruption.receive(2)
+            interruption.receive(2)
+        return state()
+
+    made.servo.state = asked
+    outcome = loop.run(interruption)
+    assert outcome.stop.kind == "not seen at rest"
+    assert outcome.error().exit_code == 4
+    controller.stop()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 def test_a_signal_ends_it_and_the_arm_stands(bench, kind, mode):
     made = bench(mode=mode)

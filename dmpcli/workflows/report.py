@@ -1,0 +1,305 @@
+"""`report`: by how much do the drawn strokes differ from the taught one."""
+
+import contextlib
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dmpcli.arrays import Floats
+from dmpcli.errors import InputError, about
+from dmpcli.messages import progress, tell, warn
+from dmpcli.records import dataset, file_io, learning_record, schemas
+from dmpcli.records import record as records
+from dmpcli.records import skill as skills
+from dmpcli.records.atomic_text import growing
+from dmpcli.records.file_io import Source
+from dmpcli.records.layouts import Layout
+from dmpcli.records.learning_record import surface_key
+from dmpcli.reporting import document
+from dmpcli.reporting.batch import STROKES, Tables, measure
+from dmpcli.reporting.batch_measures import MeasurementContext
+from dmpcli.reporting.document import (
+    FAR,
+    MOST_ROWS,
+    WAVES,
+    DocumentPart,
+    lesson_for,
+    reference_of,
+    write_waves,
+)
+from dmpcli.reporting.ranking import Pupil
+from dmpcli.reporting.recorded import Recorded
+from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
+from dmpcli.reporting.stroke_measures import Row
+from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
+from dmpcli.workflows.recording import recording
+from dmpcli.workflows.surface_input import SurfaceInput
+
+WIDTH = 80
+"""Columns that tables are printed in where no terminal says otherwise."""
+
+_SHOWN = 3
+_WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was measured, as plain values.
+
+    Attributes
+    ----------
+    document : dict
+        As in ``report.json``: docs/report.md tells what stands where.
+    """
+
+    document: Row
+
+    def __str__(self) -> str:
+        """Return the tables."""
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """Return it as tables for people, without terminal codes."""
+        return document.as_text(self.document, width)
+
+    def json(self) -> bytes:
+        """Return it as the file ``report.json``."""
+        return document.as_json(self.document)
+
+    @property
+    def strokes(self) -> list[Row]:
+        """The rows of all strokes that have one, in the order of the inputs."""
+        return [row for entry in self.document["files"] for row in entry["strokes"]]
+
+
+def check_output(output: Path | None) -> None:
+    """Refuse the name of a folder that is a file's.
+
+    Raises
+    ------
+    InputError
+    """
+    if output is not None and output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is a file, -o needs the name of a folder")
+
+
+def report(
+    inputs: Sequence[str | Source],
+    names: Sequence[str] | None,
+    layout: Layout | None,
+    read: SurfaceInput | None,
+    output: Path | None,
+) -> Report:
+    """Compare strokes, write the report's folder where one is named, and tell what is doubtful.
+
+    Parameters
+    ----------
+    inputs : sequence of str or Source
+        Demonstrations, trajectories, batch folders, runs and skills, by file or by content; the
+        first demonstration is what the others are compared with.
+    names : sequence of str, optional
+        What tables call them; by default their files' names.
+    layout : Layout, optional
+        How recordings of other programs are read.
+    read : SurfaceInput, optional
+        What the strokes lie on.
+    output : Path, optional
+        Folder of JSON, CSV and figures.
+
+    Raises
+    ------
+    InputError
+        One cannot be read, or holds nothing to report.
+    """
+    ground = said = normal = None
+    if read is not None:
+        ground, said, normal = _ground(read)
+    files = [each.name if isinstance(each, Source) else each for each in inputs]
+    labels = labels_of(files) if names is None else names
+    parts = [_part(each, label, normal, layout) for each, label in zip(inputs, labels, strict=True)]
+    parts = _seen(parts, ground)
+    if ground is not None:
+        parts = _placed(parts, ground)
+    if read is not None:
+        _warn_of_ends(parts, read)
+    with _tables(output, any(part.batch for part in parts)) as tables:
+        sight = MeasurementContext(reference_of(parts), ground, normal)
+        parts = _measured(parts, sight, tables)
+        made = document.document(parts, said)
+        for line in document.warnings(made):
+            warn(line)
+        if output is not None:
+            written = _write(output, made, parts, ground)
+    if output is not None:
+        tell(f"{output}: wrote {', '.join(written)}")
+    return Report(made)
+
+
+def _part(
+    given: str | Source, label: str, normal: Floats | None, form: Layout | None
+) -> DocumentPart:
+    """Read one input, whatever it is; how recordings are seen, all of them together tell."""
+    if isinstance(given, str) and given != file_io.DASH and Path(given).is_dir():
+        return _batch(Path(given), label, normal)
+    source = given if isinstance(given, Source) else file_io.read(given)
+    if source.content.lstrip()[:1] == b"{":
+        learned, file = skills.decode(source)
+        with about(source.name):
+            pupil = Pupil(label, learned, file, learning_record.of_skill(file))
+        return DocumentPart(label, source.sha256, skills.SCHEMA, pupil=pupil)
+    found = records.decode(source) if records.is_ours(source) else None
+    if found is None or found.schema is schemas.DEMONSTRATION:
+        read = recording(source, None if found else form)
+        kind = "recording" if found is None else "demonstration"
+        recorded = Recorded(read, label, source.name, source.sha256, normal)
+        if found is not None:
+            recorded.origin = found.provenance
+        return DocumentPart(label, source.sha256, kind, recorded=recorded)
+    run = found if found.schema is schemas.RUN else None
+    states = None if run is None else states_of(run)
+    with about(source.name):
+        strokes = strokes_of(found, label, normal)
+    return DocumentPart(label, source.sha256, found.schema.name, strokes, run, states=states)
+
+
+def _batch(folder: Path, label: str, normal: Floats | None) -> DocumentPart:
+    """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
+    batch, odd = dataset.read(folder)
+    for remark in odd:
+        tell(remark)
+    if len(batch) > MOST_ROWS:
+        with about(str(folder)):
+            drawn_by = learning_record.of_facts(dataset.facts_of(batch))
+        return DocumentPart(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
+    pairs = records.decode(file_io.read_table(folder), schemas.PAIRS)
+    known, states = pairs_of(pairs)
+    strokes = []
+    for name in batch.files:
+        part = records.decode(file_io.read(folder / name), schemas.TRAJECTORY)
+        with about(part.name):
+            strokes += strokes_of(part, label, normal, known)
+    return DocumentPart(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
+
+
+def _ground(read: SurfaceInput) -> tuple[ReportSurface, Row, Floats | None]:
+    """Return the surface as figures see it, what the report says of it, and a plane's normal."""
+    from dmpcli.surfaces.mesh import Mesh  # loads libigl
+    from dmpcli.surfaces.plane import Plane
+
+    path = read.path
+    found, key = read.surface, surface_key(read.facts)
+    if isinstance(found, Mesh):
+        return ReportSurface(path.name, found, found.V, found.F, key), read.said, None
+    normal = found.normal if isinstance(found, Plane) else None
+    return ReportSurface(path.name, found, key=key), read.said, normal
+
+
+def _seen(parts: list[DocumentPart], ground: ReportSurface | None) -> list[DocumentPart]:
+    """Let recordings be seen as the skills did that learned from them."""
+    pupils = [part.pupil for part in parts if part.pupil]
+    done = []
+    for part in parts:
+        recorded = part.recorded
+        if recorded is None:
+            done.append(part)
+            continue
+        recorded.skills = [(pupil.lesson, pupil.skill) for pupil in pupils]
+        recorded.surfaces = {} if ground is None else {ground.key: ground.surface}
+        with about(recorded.name):
+            stroke = recorded.stroke(lesson_for(parts, part.sha256))
+        done.append(replace(part, strokes=[stroke]))
+    return done
+
+
+def _placed(parts: list[DocumentPart], ground: ReportSurface) -> list[DocumentPart]:
+    """Measure how every trajectory and run lies on the surface."""
+    reference = reference_of(parts)
+    done = []
+    with progress("measuring", sum(len(part.strokes) for part in parts)) as advance:
+        for part in parts:
+            strokes = []
+            for first in range(0, len(part.strokes), AT_ONCE):
+                some = part.strokes[first : first + AT_ONCE]
+                strokes += placed(some, ground, reference)
+                advance(len(some))
+            done.append(replace(part, strokes=strokes))
+    return done
+
+
+def _warn_of_ends(parts: list[DocumentPart], read: SurfaceInput) -> None:
+    """Say of strokes that were planned to begin or end off the surface where it is instead."""
+    from dmpcli.workflows import off_surface
+
+    lines = []
+    for stroke in (stroke for part in parts for stroke in part.strokes):
+        lies = stroke.footing
+        if lies is None:
+            continue
+        ends = {"start": (lies.start_off, stroke.start), "goal": (lies.goal_off, stroke.goal)}
+        far = {name: end for name, end in ends.items() if end[0] > FAR}
+        if not far:
+            continue
+        said = off_surface.distances({name: off for name, (off, _) in far.items()})
+        lines.append((stroke.label, said, {name: point for name, (_, point) in far.items()}))
+    for label, said, points in lines[:_SHOWN]:
+        warn(f"{label}: {said} {read.path.name}; {off_surface.remedy(points, read)}")
+    if len(lines) > _SHOWN:
+        warn(f"and {len(lines) - _SHOWN} more strokes that begin or end off {read.path.name}")
+
+
+@contextlib.contextmanager
+def _tables(output: Path | None, batches: bool) -> Iterator[Tables | None]:
+    """Open the tables that grow with the strokes; without a folder there are none."""
+    if output is None:
+        yield None
+        return
+    heads = {_WAVES: WAVES} | ({_STROKES: STROKES} if batches else {})
+    with growing(output, list(heads)) as (waves, *strokes):
+        for sink, head in zip((waves, *strokes), heads.values(), strict=True):
+            csv.writer(sink, lineterminator="\n").writerow(head)
+        yield Tables(waves, strokes[0] if strokes else None)
+
+
+def _measured(
+    parts: list[DocumentPart], sight: MeasurementContext, tables: Tables | None
+) -> list[DocumentPart]:
+    """Measure large batches, and write down the wave heights of all strokes."""
+    done = []
+    total = sum(len(part.batch) for part in parts if part.batch)
+    with progress("measuring", total) as advance:
+        for part in parts:
+            if part.batch is None:
+                done.append(part)
+                if tables is not None:
+                    write_waves(part.strokes, tables.waves)
+                continue
+            many = measure(part.batch, part.name, sight, tables, advance)
+            done.append(replace(part, strokes=many.shown, many=many))
+    return done
+
+
+def _write(
+    output: Path, report: Row, parts: list[DocumentPart], ground: ReportSurface | None
+) -> list[str]:
+    """Write each file whole; return their names."""
+    from dmpcli.reporting import batch_figures, figures  # load matplotlib
+
+    strokes = [stroke for part in parts for stroke in part.strokes]
+    files = {
+        "report.json": document.as_json(report),
+        **figures.gallery(strokes, ground),
+        **figures.spreads([part.pupil.skill for part in parts if part.pupil]),
+        **batch_figures.batch_figures([part.many for part in parts if part.many]),
+    }
+    # Figures of an earlier report that this one does not draw would be taken for its own.
+    ours = ("fig[0-9]_*.*", "batch_*.*", "spread_*.*")
+    for old in [path for name in ours for path in output.glob(name)]:
+        if old.name not in files and old.suffix in (".svg", ".png"):
+            old.unlink()
+    batches = any(part.many for part in parts)
+    if not batches:
+        (output / _STROKES).unlink(missing_ok=True)
+    for name, content in files.items():
+        file_io.write(output / name, content)
+    return [*files, _WAVES, *([_STROKES] if batches else [])]

@@ -1,0 +1,329 @@
+"""One run: a command on the bench, with the faults of its seed, and what a judge says of it."""
+
+import re
+import signal
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from typer.testing import CliRunner
+
+from dmpcli.arrays import Floats
+from dmpcli.cli import app
+from dmpcli.control.signals import Interruption
+from dmpcli.kinematics import chain
+from dmpcli.kinematics.models import model
+from dmpcli.records import file_io, record, schemas, tool
+from dmpcli.records.record import Provenance, Record
+from dmpcli.simulation.elite_server.lab import ROBOT_MODEL, LabParameters
+from dmpcli.simulation.mock import PEN
+from tests.faults.bench import Bench
+from tests.faults.faults import KINDS, Wrong
+
+START = np.array([-551.03, 131.399, 245.031])
+STROKES = {"stroke": 1.0, "short": 0.12}
+"""What is executed; the shorter one ends within the following error that is allowed."""
+ALLOWED = {0, 2, 3, 4, *(128 + n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))}
+# mm/s of the TCP: an arm at rest; and how long it may go on after the command, s.
+_REST, _AFTER = 0.5, 0.3
+# What a person is told where the arm was not seen at rest.
+_UNSURE = re.compile(
+    r"emergency stop|may still be moving|could NOT be stopped|not (seen|confirmed)"
+)
+
+
+@dataclass
+class Finding:
+    """What one run came to.
+
+    Attributes
+    ----------
+    seed : int
+    command : str
+    stroke : str
+        Which is executed.
+    faults : str
+    code : int
+    told : str
+    wrong : list of str
+        Invariants that do not hold; empty where all do.
+    """
+
+    seed: int
+    command: str
+    stroke: str
+    faults: str
+    code: int
+    told: str
+    wrong: list[str] = field(default_factory=list)
+
+
+class Push:
+    """A hand that swings the tool to and fro, and lets go."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._force = np.append(rng.uniform(-12.0, 12.0, 3), np.zeros(3))
+        self._period, self._until = rng.uniform(0.3, 1.0), rng.uniform(0.5, 2.0)
+        self._since: float | None = None
+
+    def watch(self, t: float, arm: object, transmission: Any) -> None:
+        """Take hold where set-points flow."""
+        del arm
+        if self._since is None and transmission is not None and transmission.running:
+            self._since = t
+
+    def wrench(self, t: float, *_: object) -> Floats:
+        """Return the wrench on the tool, shape (6,), N and N·m."""
+        if self._since is None or not 0.0 <= t - self._since <= self._until:
+            return np.zeros(6)
+        return self._force * np.sin(2.0 * np.pi * (t - self._since) / self._period)
+
+
+@cache
+def folder() -> Path:
+    """A folder with what the commands read."""
+    made = Path(tempfile.mkdtemp(prefix="dmpcli-faults-"))
+    (made / "pen.json").write_bytes(tool.encode(PEN))
+    for name, scale in STROKES.items():
+        t = 0.02 * np.arange(41)
+        u = t / t[-1]
+        u = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        path = np.column_stack([-20.0 * u, 12.0 * u, 4.0 * np.sin(2.0 * np.pi * u)])
+        x, y, z = (START + scale * path).T
+        columns = {"id": np.full(len(t), "0", dtype=object), "t": t, "x": x, "y": y, "z": z}
+        facts = {"tau": float(t[-1]), "normal": [0.0, 0.0, 1.0]}
+        drawn = Record(schemas.TRAJECTORY, columns, Provenance("generalize", {}, (), facts))
+        (made / f"{name}.parquet").write_bytes(record.encode(drawn))
+    return made
+
+
+def run(seed: int, kinds: list[str] | None = None, command: str | None = None) -> Finding:
+    """Run one seed.
+
+    Parameters
+    ----------
+    seed : int
+    kinds : list of str, optional
+        Faults to put on; by the seed otherwise, none to three.
+    command : str, optional
+    """
+    rng = np.random.default_rng([seed, 0xFA])
+    drawn = str(
+        rng.choice(
+            ["execute", "execute felt", "execute pressed", "execute file", "record"],
+            p=[0.3, 0.25, 0.1, 0.1, 0.25],
+        )
+    )
+    command = command or drawn
+    names = sorted(KINDS)
+    chosen = [
+        str(k)
+        for k in rng.choice(names, int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1])), replace=False)
+    ]
+    chosen = chosen if kinds is None else kinds
+    stroke = str(rng.choice([*STROKES]))
+    wrong = Wrong()
+    records = command == "record"
+    hand = Push(rng) if records and rng.random() < 0.6 else None
+    bench = Bench(LabParameters(START, seed=seed), hand, seed)  # type: ignore[arg-type]
+    output = folder() / f"out-{seed}.parquet"
+    with ExitStack() as stack:
+        for kind in chosen:
+            KINDS[kind](bench, rng, wrong, stack)
+        stack.enter_context(bench.laid_out())
+        for module in ("execute", "record"):  # its thread knows the machine's clock alone
+            watched = f"dmpcli.workflows.{module}.watched"
+            stack.enter_context(mock.patch(watched, lambda servo: servo))
+        stack.enter_context(_signals(bench))
+        result = CliRunner().invoke(app, _words(command, stroke, output))
+        rest = _at_rest(bench)
+    finding = Finding(
+        seed, command, stroke, "; ".join(wrong.words) or "nothing", result.exit_code, result.stderr
+    )
+    try:
+        finding.wrong = list(_judged(finding, result, bench, wrong, output, rest, hand))
+    finally:
+        for left in folder().glob(f"*out-{seed}*"):
+            left.unlink()
+    return finding
+
+
+def _words(command: str, stroke: str, output: Path) -> list[str]:
+    made = folder()
+    robot = "elite://127.0.0.1?lookahead=0.1" + ("&mode=file" if command.endswith("file") else "")
+    words = ["-o", str(output), "--robot", robot, "--tool", str(made / "pen.json")]
+    felt = ["--sensor", "netft://127.0.0.1"]
+    if command == "record":
+        return ["record", *words, *felt, "--duration", "1.3"]
+    words = ["execute", str(made / f"{stroke}.parquet"), *words]
+    if command.endswith("file"):
+        words.append("--allow-file-mode") if "allow_file_mode" in _options() else None
+    if command.endswith("felt"):
+        words += felt
+    if command.endswith("pressed"):
+        words += [*felt, "--coupling", "force", "--force-setpoint", "2"]
+    return words
+
+
+@cache
+def _options() -> str:
+    from dmpcli.commands import execute
+
+    return Path(execute.__file__).read_text()
+
+
+@contextmanager
+def _signals(bench: Bench) -> Iterator[None]:
+    """Signals reach the interruption that is entered, as the system's would."""
+    entered: list[Interruption] = []
+    enter, leave = Interruption.__enter__, Interruption.__exit__
+
+    def entering(self: Interruption) -> Interruption:
+        entered.append(self)
+        return enter(self)
+
+    def leaving(self: Interruption, *why: Any) -> None:
+        entered.remove(self)
+        leave(self, *why)
+
+    bench.signal = lambda number: entered and entered[-1].receive(number)
+    with (
+        mock.patch.object(Interruption, "__enter__", entering),
+        mock.patch.object(Interruption, "__exit__", leaving),
+    ):
+        yield
+
+
+def _at_rest(bench: Bench) -> bool:
+    """Whether the arm stands, truly, soon after the command has ended."""
+    bench.world.advance(bench.world.now() + _AFTER)
+    before = bench.lab.controller.arm.posture.position
+    moved = 0.0
+    for _ in range(5):
+        bench.world.advance(bench.world.now() + 0.1)
+        bench.lab.frame()
+        now = bench.lab.controller.arm.posture.position
+        moved = max(moved, float(np.linalg.norm(now - before)) / 0.1)
+        before = now
+    return moved <= _REST
+
+
+def _judged(
+    finding: Finding,
+    result: Any,
+    bench: Bench,
+    wrong: Wrong,
+    output: Path,
+    rest: bool,
+    hand: object,
+) -> Iterator[str]:
+    code, told = finding.code, finding.told
+    if code not in ALLOWED:
+        yield f"exit {code}"
+        if result.exception is not None:
+            yield "".join(traceback.format_exception(*result.exc_info))[-1500:]
+    if not rest and not _UNSURE.search(told.strip().splitlines()[-1] if told.strip() else ""):
+        yield "the arm moves on, and the last line does not say so"
+    if not rest and code in (0, 2, 3):
+        yield f"the arm moves on, and the exit code is {code}"
+    yield from _steps(finding, bench)
+    if code == 0:
+        yield from _done(finding, bench, output, wrong)
+    if "disk" not in wrong.hides:
+        yield from _kept(finding, bench, output)
+    if finding.command == "record" and hand is None:
+        travel = _travel(bench)
+        if travel > 15.0:
+            yield f"nobody pulls, and the arm moves by {travel:.1f} mm"
+
+
+def _positions(bench: Bench) -> tuple[Floats, Floats]:
+    """Times and TCP positions of the set-points that were taken, shape (S,) and (S, 3)."""
+    if not bench.sent:
+        return np.zeros(0), np.zeros((0, 3))
+    joints = np.array([joints for _, joints in bench.sent])
+    position, rotation = chain.forward(model(ROBOT_MODEL), joints)
+    return np.array([t for t, _ in bench.sent]), position + rotation @ PEN.tcp_position
+
+
+def _steps(finding: Finding, bench: Bench) -> Iterator[str]:
+    """No set-point steps further than the plan does, nor leaves it."""
+    _, sent = _positions(bench)
+    if len(sent) < 2:
+        return
+    steps = np.linalg.norm(np.diff(sent, axis=0), axis=1)
+    if finding.command == "record":
+        if steps.max() > 0.02 * 250.0 * 1.01:
+            yield f"a set-point steps by {steps.max():.2f} mm"
+        return
+    plan = _plan(finding.stroke)
+    # A soft start and the way back on the same path are slower than the plan.
+    most = 1.02 * np.linalg.norm(np.diff(plan, axis=0), axis=1).max() + 0.01
+    if finding.command != "execute pressed" and steps.max() > most:
+        yield f"a set-point steps by {steps.max():.3f} mm, the plan by {most:.3f}"
+    off = sent if finding.command != "execute pressed" else sent * [1.0, 1.0, 0.0]
+    line = _fine(plan if finding.command != "execute pressed" else plan * [1.0, 1.0, 0.0])
+    away = np.linalg.norm(off[:, None] - line[None], axis=2).min(axis=1).max()
+    if away > 0.1:
+        yield f"a set-point is {away:.2f} mm off the plan"
+
+
+@cache
+def _plan(name: str) -> Floats:
+    kept = record.decode(file_io.read(str(folder() / f"{name}.parquet")), schemas.TRAJECTORY)
+    return np.column_stack([kept.columns[name] for name in "xyz"]).astype(float)
+
+
+def _fine(path: Floats) -> Floats:
+    u = np.linspace(0.0, len(path) - 1.0, 20 * len(path))
+    return np.column_stack([np.interp(u, np.arange(len(path)), column) for column in path.T])
+
+
+def _travel(bench: Bench) -> float:
+    """How far the set-points led the arm, mm."""
+    _, sent = _positions(bench)
+    return float(np.linalg.norm(sent - sent[0], axis=1).max()) if len(sent) else 0.0
+
+
+def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterator[str]:
+    """Exit 0: it was done, and it was done right."""
+    if not output.exists():
+        yield "exit 0 without a file"
+        return
+    stop = bench.must_stop + (
+        [] if finding.command in ("execute", "execute file") else bench.must_stop_with_sensor
+    )
+    lasts = bench.ended - bench.entered if bench.ended else 0.0
+    if any(after < lasts - 0.15 for after in stop):
+        yield f"exit 0, and the arm had to stop {min(stop):.2f} s in, of {lasts:.2f}"
+    if finding.command == "record":
+        return
+    kept = record.decode(file_io.read(str(output)), schemas.RUN)
+    if not kept.provenance.facts["completed"]:
+        yield "exit 0 of a run that says it is not complete"
+    at = bench.lab.controller.arm.posture.position
+    away = float(np.linalg.norm(at - _plan(finding.stroke)[-1]))
+    if finding.command != "execute pressed" and away > 1.0:
+        yield f"exit 0, and the arm stands {away:.2f} mm from the goal"
+
+
+def _kept(finding: Finding, bench: Bench, output: Path) -> Iterator[str]:
+    """What was logged is there: in the file or in the journal."""
+    if len(bench.sent) < 15:
+        return
+    journals = [p for p in output.parent.glob(f"*out-{finding.seed}*") if p != output]
+    if not output.exists() and not journals:
+        yield f"{len(bench.sent)} set-points were sent, and nothing is kept"
+    if output.exists():
+        schema = schemas.DEMONSTRATION if finding.command == "record" else schemas.RUN
+        record.decode(file_io.read(str(output)), schema)
+
+
+Report = Callable[[Finding], None]
