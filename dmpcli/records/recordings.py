@@ -146,7 +146,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
-    reading = _Reading(*_table(source, given))
+    reading = _recognised(_Reading(*_table(source, given)))
     reading.told += reading.table.remarks
     reading.table = episodes.chosen(reading.table, given.episode, _times(reading))
     t, name = _time(reading)
@@ -183,6 +183,26 @@ def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
         if layout.header:
             return tables.read(source, layout.header, layout.decimal), layout
         raise InputError(f"{source.name}: {_headless(error, commented)}") from None
+
+
+def _recognised(reading: _Reading) -> _Reading:
+    """Take the one layout that fits a table which has neither our names nor a layout named."""
+    if reading.layout.columns or _has_ours(reading):
+        return reading
+    suits = layouts.suited(reading.names)
+    if len(suits) == 1:
+        [name] = suits
+        given = {key: getattr(reading.layout, key) for key in reading.layout.said if key != "map"}
+        reading.layout = layouts.adapted(LAYOUTS[name], (), given)
+        reading.told.append(f"recognised as --layout {name}; another --layout or --map says else")
+    return reading
+
+
+def _has_ours(reading: _Reading) -> bool:
+    """Tell whether all of t, x, y and z stand under our own names."""
+    plain = Layout()
+    wanted = "xyz" if reading.layout.sample_rate is not None else ("t", *"xyz")
+    return all(layouts.found(plain, reading.names, ours) is not None for ours in wanted)
 
 
 def _all_found(layout: Layout, names: list[str]) -> bool:
@@ -260,7 +280,7 @@ def _no_column(reading: _Reading, ours: str) -> str:
     text = f"column {wanted!r} is missing; it has {shown}"
     suits = layouts.suited(names)
     if suits and not reading.layout.columns:
-        return f"{text}; --layout {suits[0]} reads it"
+        return f"{text}; --layout {' or '.join(suits)} reads it"
     if ours == "t":
         return f"{text}; name the column of time with --map t=COLUMN, or say --sample-rate HZ"
     return f"{text}; say which it is with --map {ours}=COLUMN"
