@@ -175,13 +175,13 @@ def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
         return motive.read(source), layout
     names = layout.header if "header" in layout.said else ()
     try:
-        return tables.read(source, names, layout.decimal), layout
+        return tables.read(source, names, layout.decimal, episodes.NAMES), layout
     except HeadlessError as error:
         commented = tables.commented_names(source, error.count)
         if commented and _all_found(layout, commented):
-            return tables.read(source, commented, layout.decimal), layout
+            return tables.read(source, commented, layout.decimal, episodes.NAMES), layout
         if layout.header:
-            return tables.read(source, layout.header, layout.decimal), layout
+            return tables.read(source, layout.header, layout.decimal, episodes.NAMES), layout
         raise InputError(f"{source.name}: {_headless(error, commented)}") from None
 
 
