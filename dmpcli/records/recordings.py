@@ -322,7 +322,7 @@ def _rotation(reading: _Reading) -> Floats | None:
         f"{rotation_forms.lean(R[0]):.1f}° from straight down at the start"
     )
     if assumed and form == "euler":
-        calmer = rotation_forms.calmer(values)
+        calmer = rotation_forms.calmer(values, R)
         if calmer is not None:
             reading.doubts.append(
                 f"the tool leaps between samples where {by} are read as Euler angles; it does not "

@@ -276,7 +276,9 @@ def _number_columns(
         None where a cell of such a column is none, or no finite one: read as text, it can be shown
         as it stands.
     """
-    first = _cells(body.partition(b"\n")[0], separator)
+    # Not by partition, which would copy all of the rest.
+    end = body.find(b"\n")
+    first = _cells(body[: end if end >= 0 else len(body)], separator)
     kinds = {
         name: pa.float64() if name not in texts and _is_small(cell) else pa.string()
         for name, cell in zip(names, first, strict=False)
