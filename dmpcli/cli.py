@@ -1,6 +1,7 @@
 """The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
 
 import importlib
+import keyword
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ COMMANDS = {
     "generalize": "Draw a skill at new start and goal points.",
     "execute": "Check a trajectory, then stream it; Ctrl-C decelerates, a second one stops at once.",  # noqa: E501
     "report": "Compare strokes: wave heights, deviation, smoothness, ends, deadlines.",
+    "import": "Make demonstrations of other programs' recordings, drawings and robot programs.",
     "export": "Write a motion as other programs read it: tables, bags, polylines, robot programs.",
     "inspect": "Say what a file is: schema, columns, units, ranges, provenance.",
     "recover": "Make the file that a crash kept `record` or `execute` from writing.",
@@ -31,7 +33,12 @@ COMMANDS = {
     "calibrate": "Identify what hangs on the sensor from static poses, with nothing touching the tool.",  # noqa: E501
     "touch": "Lead the tip to a point by pendant or hand; Enter takes it, at rest, and q ends.",
 }
-"""Each subcommand, which is the module of `dmpcli.commands` of its name, in one sentence."""
+"""Each subcommand in one sentence; its module of `dmpcli.commands` has its name."""
+
+
+def module_of(command: str) -> str:
+    """Return the module of a subcommand; a word of Python's own cannot be a module's name."""
+    return f"dmpcli.commands.{command}" + ("_" if keyword.iskeyword(command) else "")
 
 
 class LazyCommand(TyperCommand):
@@ -41,7 +48,7 @@ class LazyCommand(TyperCommand):
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> Any:
         """Parse the words after the subcommand's name, by what its module declares."""
-        module = importlib.import_module(f"dmpcli.commands.{self.name}")
+        module = importlib.import_module(module_of(str(self.name)))
         whole = typer.Typer(
             add_completion=False,
             rich_markup_mode=None,

@@ -68,7 +68,9 @@ UR = Extra(
     Wheels((3, 12), ("linux x86_64", "linux i686", "win32 AMD64")),
 )
 DASK = Extra("dask", ("dask", "distributed", "threadpoolctl"), "`generalize --cluster`")
-EXTRAS = (UR, DASK)
+SVG = Extra("svg", ("svgelements",), "`import` of SVG drawings")
+ROS = Extra("ros", ("rosbags", "mcap"), "MCAP files and ROS 2 bags")
+EXTRAS = (UR, DASK, SVG, ROS)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",

@@ -7,7 +7,7 @@ import pytest
 
 from dmpcli import extras
 
-MODULES = {"ur": "rtde_receive", "dask": "distributed"}
+MODULES = {"ur": "rtde_receive", "dask": "distributed", "svg": "svgelements", "ros": "rosbags"}
 
 
 def needs(extra: extras.Extra) -> pytest.MarkDecorator:

@@ -19,6 +19,7 @@ from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, spelled
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import ProgramOptions, legs, toolpaths
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import decoder
 
 INCH = 25.4
 LONGEST_ARC = 100_000
@@ -77,7 +78,7 @@ def _point(position: Floats) -> str:
     return " ".join(f"{n}{number(v, 4)}" for n, v in zip("XYZ", position.tolist(), strict=True))
 
 
-_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.ASCII)
 _COMMENT = re.compile(r"\(([^)]*)\)|;(.*)")
 _MOTIONS = {0: "G0", 1: "G1", 2: "G2", 3: "G3"}
 _HARMLESS = {4, 17, 20, 21, 40, 49, 54, 61, 61.1, 64, 80, 90, 91, 91.1, 94, 98, 99}
@@ -199,6 +200,7 @@ class _Machine:
         )
 
 
+@decoder
 def decode(source: Source, tolerance: float = 0.01, travel: float = 50.0) -> list[MotionStroke]:
     """Read the path of a pen, mm; time by the feeds.
 

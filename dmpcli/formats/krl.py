@@ -23,6 +23,7 @@ from dmpcli.formats.toolpath import (
 )
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import matrices
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.wrench import Tool
 
 LONGEST_NAME = 24
@@ -131,18 +132,19 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
 
 
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIN = re.compile(r"LIN\s*\{([^}]*)\}\s*(C_DIS|C_VEL|C_ORI)?", re.IGNORECASE)
-_ENTRY = re.compile(rf"\s*([A-Z]\d?)\s+({_N})\s*", re.IGNORECASE)
-_VALUE = re.compile(rf"\$VEL\.(CP|ORI1|ORI2)\s*=\s*({_N})", re.IGNORECASE)
-_WAIT = re.compile(rf"WAIT\s+SEC\s+({_N})", re.IGNORECASE)
+_LIN = re.compile(r"LIN\s*\{([^}]*)\}\s*(C_DIS|C_VEL|C_ORI)?", re.ASCII | re.IGNORECASE)
+_ENTRY = re.compile(rf"\s*([A-Z]\d?)\s+({_N})\s*", re.ASCII | re.IGNORECASE)
+_VALUE = re.compile(rf"\$VEL\.(CP|ORI1|ORI2)\s*=\s*({_N})", re.ASCII | re.IGNORECASE)
+_WAIT = re.compile(rf"WAIT\s+SEC\s+({_N})", re.ASCII | re.IGNORECASE)
 _HARMLESS = re.compile(
     r"(&.*|(GLOBAL\s+)?DEF\s+\w+\s*\(\s*\)|END|\w+\s*\(\s*\)|BAS\s*\(.*\)|PTP\s+\$AXIS_ACT|"
     r"PTP\s+\$POS_ACT|\$[\w.\[\]]+\s*=.*|(DECL|INT|REAL|BOOL)\s.*)",
-    re.IGNORECASE,
+    re.ASCII | re.IGNORECASE,
 )
 _NAMES = ("X", "Y", "Z", "A", "B", "C")
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a program of straight moves.
 

@@ -24,6 +24,7 @@ from dmpcli.formats.toolpath import (
 )
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import wrong
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 from dmpcli.spatial.wrench import Tool
 
@@ -99,21 +100,22 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
 
 
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIST = re.compile(_N)
+_LIST = re.compile(_N, re.ASCII)
 _MOVE = re.compile(
     rf"MoveL\s+\[\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]\s*,[^;]*?\]\s*\]\s*,\s*"
     rf"(?:v({_N}|max)|\[\s*({_N})[^\]]*\])\s*(?:\\([VT])\s*:=\s*({_N}))?\s*,[^;]*;",
-    re.IGNORECASE,
+    re.ASCII | re.IGNORECASE,
 )
-_WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.IGNORECASE)
+_WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.ASCII | re.IGNORECASE)
 _HARMLESS = re.compile(
     r"(MODULE\s+\w+.*|ENDMODULE|(LOCAL\s+)?PROC\s+\w+\s*\(\s*\)|ENDPROC|"
     r"(LOCAL\s+)?(PERS|CONST|VAR|TASK)\s.*;|\w+\s*;|(ConfL|ConfJ|SingArea|AccSet)\b.*;|"
     r"\w+\s*:=\s*CTool\s*\(\s*\)\s*;|%%%|VERSION:.*|LANGUAGE:.*)",
-    re.IGNORECASE,
+    re.ASCII | re.IGNORECASE,
 )
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a module of straight moves.
 

@@ -41,6 +41,9 @@ FORMATS = {
         FileFormat("urscript", (".script", ".urscript"), "Universal Robots program", program=True),
         FileFormat("krl", (".src",), "KUKA program", program=True),
         FileFormat("rapid", (".mod", ".modx"), "ABB program", program=True),
+        FileFormat("mcap", (".mcap",), "MCAP of ROS 2 messages"),
+        FileFormat("ros2", (), "ROS 2 bag, a folder", folder=True),
+        FileFormat("lerobot", (), "LeRobot v3 dataset, a folder", folder=True),
     )
 }
 

@@ -22,6 +22,7 @@ from dmpcli.formats.toolpath import (
     toolpaths,
 )
 from dmpcli.records.file_io import Source
+from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.rotations import exp, log
 from dmpcli.spatial.wrench import Tool
 
@@ -93,15 +94,17 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
 
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _POSE = rf"p\s*\[\s*({_N}(?:\s*,\s*{_N}){{5}})\s*\]"
-_MOVE = re.compile(rf"(movel|movep)\s*\(\s*{_POSE}\s*((?:,[^)]*)?)\)")
-_SLEEP = re.compile(rf"sleep\s*\(\s*({_N})\s*\)")
-_SAID = re.compile(rf"\s*(?:([avtr])\s*=)?\s*({_N})\s*")
+_MOVE = re.compile(rf"(movel|movep)\s*\(\s*{_POSE}\s*((?:,[^)]*)?)\)", re.ASCII)
+_SLEEP = re.compile(rf"sleep\s*\(\s*({_N})\s*\)", re.ASCII)
+_SAID = re.compile(rf"\s*(?:([avtr])\s*=)?\s*({_N})\s*", re.ASCII)
 _HARMLESS = re.compile(
     r"(def\s+\w+\s*\(\s*\)\s*:|end|\w+\s*\(\s*\)|"
-    r"(set_|textmsg|popup|sync|stopl|stopj)\w*\s*\(.*\)|global\s.*)"
+    r"(set_|textmsg|popup|sync|stopl|stopj)\w*\s*\(.*\)|global\s.*)",
+    re.ASCII,
 )
 
 
+@decoder
 def decode(source: Source) -> list[MotionStroke]:
     """Read a program of straight moves.
 

@@ -72,6 +72,8 @@ class Layout:
         Hz; the rows are counted instead of reading a column of time.
     repeated : {'error', 'first', 'mean'}
         What becomes of rows with one and the same stamp.
+    episode : str, optional
+        Which of several recordings of one table; see `episodes`.
     said : tuple of str
         Which of these were said for this file, and are no part of a known layout.
     """
@@ -87,6 +89,7 @@ class Layout:
     decimal: str | None = None
     sample_rate: float | None = None
     repeated: str = "error"
+    episode: str | None = None
     said: tuple[str, ...] = ()
 
     def names(self, ours: str) -> tuple[str, ...]:
@@ -102,7 +105,7 @@ class Layout:
             "angle": self.angle,
             "rotation": self.rotation,
         }
-        for name in ("header", "body", "decimal", "sample_rate", "repeated"):
+        for name in ("header", "body", "decimal", "sample_rate", "repeated", "episode"):
             value = getattr(self, name)
             if value != getattr(Layout(), name):
                 options[name] = list(value) if name == "header" else value
@@ -127,6 +130,15 @@ def _matrix(name: str) -> tuple[str, ...]:
         f"O_T_EE.{number}",
     )
 
+
+_MOTIVE = Layout(
+    {"t": ("Time (Seconds)",)}
+    | {axis: (f"Position.{axis.upper()}",) for axis in "xyz"}
+    | {f"q{axis}": (f"Rotation.{axis.upper()}",) for axis in "xyzw"},
+    length="m",
+    rotation="quaternion",
+    prefixed=True,
+)
 
 LAYOUTS = {
     # Universal Robots RTDE recordings (the csv_writer of its RTDE Python client library).
@@ -218,14 +230,17 @@ LAYOUTS = {
         prefixed=True,
     ),
     # OptiTrack Motive's CSV export of a rigid body; see `motive`, which reads its header.
-    "motive": Layout(
-        {"t": ("Time (Seconds)",)}
-        | {axis: (f"Position.{axis.upper()}",) for axis in "xyz"}
-        | {f"q{axis}": (f"Rotation.{axis.upper()}",) for axis in "xyzw"},
+    "motive": _MOTIVE,
+    # The same by its maker's name.
+    "optitrack": _MOTIVE,
+    # LeRobotDataset v2 and v3: what observation.state holds, meta/info.json says; m by custom.
+    "lerobot": Layout(
+        {"t": ("timestamp",)}
+        | {axis: (f"observation.state[{i}]",) for i, axis in enumerate("xyz")},
         length="m",
-        rotation="quaternion",
-        prefixed=True,
     ),
+    # Tables as export writes them.
+    "dmpcli": Layout(rotation="XYZ"),
 }
 
 
@@ -351,6 +366,8 @@ def suited(names: Sequence[str]) -> list[str]:
     """Return the known layouts that find time, position and rotation among a table's columns."""
     suits = []
     for key, layout in LAYOUTS.items():
+        if layout.rotation is None or key == "dmpcli":
+            continue  # it would fit anything
         wanted = ("t", *"xyz", *rotation_forms.columns_of(str(layout.rotation)))
         try:
             if all(found(layout, names, ours) is not None for ours in wanted):

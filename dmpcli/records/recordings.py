@@ -11,6 +11,7 @@ import numpy as np
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError, counted
 from dmpcli.records import (
+    episodes,
     layouts,
     motive,
     plausibility,
@@ -145,8 +146,9 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
-    reading = _Reading(*_table(source, given))
+    reading = _recognised(_Reading(*_table(source, given)))
     reading.told += reading.table.remarks
+    reading.table = episodes.chosen(reading.table, given.episode, _times(reading))
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
@@ -173,14 +175,34 @@ def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
         return motive.read(source), layout
     names = layout.header if "header" in layout.said else ()
     try:
-        return tables.read(source, names, layout.decimal), layout
+        return tables.read(source, names, layout.decimal, episodes.NAMES), layout
     except HeadlessError as error:
         commented = tables.commented_names(source, error.count)
         if commented and _all_found(layout, commented):
-            return tables.read(source, commented, layout.decimal), layout
+            return tables.read(source, commented, layout.decimal, episodes.NAMES), layout
         if layout.header:
-            return tables.read(source, layout.header, layout.decimal), layout
+            return tables.read(source, layout.header, layout.decimal, episodes.NAMES), layout
         raise InputError(f"{source.name}: {_headless(error, commented)}") from None
+
+
+def _recognised(reading: _Reading) -> _Reading:
+    """Take the one layout that fits a table which has neither our names nor a layout named."""
+    if reading.layout.columns or _has_ours(reading):
+        return reading
+    suits = layouts.suited(reading.names)
+    if len(suits) == 1:
+        [name] = suits
+        given = {key: getattr(reading.layout, key) for key in reading.layout.said if key != "map"}
+        reading.layout = layouts.adapted(LAYOUTS[name], (), given)
+        reading.told.append(f"recognised as --layout {name}; another --layout or --map says else")
+    return reading
+
+
+def _has_ours(reading: _Reading) -> bool:
+    """Tell whether all of t, x, y and z stand under our own names."""
+    plain = Layout()
+    wanted = "xyz" if reading.layout.sample_rate is not None else ("t", *"xyz")
+    return all(layouts.found(plain, reading.names, ours) is not None for ours in wanted)
 
 
 def _all_found(layout: Layout, names: list[str]) -> bool:
@@ -204,6 +226,12 @@ def _headless(error: HeadlessError, commented: list[str] | None) -> str:
         f"line {error.line} holds {counted(error.count, 'number')}, not names of columns; name the "
         f"columns in order, as {how} does"
     )
+
+
+def _times(reading: _Reading) -> list[str]:
+    """Names of the columns that time is read from."""
+    named = [layouts.found(reading.layout, reading.names, "t")] if reading.names else []
+    return [column.name for column in named if column is not None]
 
 
 def _time(reading: _Reading) -> tuple[Floats, str]:
@@ -252,7 +280,7 @@ def _no_column(reading: _Reading, ours: str) -> str:
     text = f"column {wanted!r} is missing; it has {shown}"
     suits = layouts.suited(names)
     if suits and not reading.layout.columns:
-        return f"{text}; --layout {suits[0]} reads it"
+        return f"{text}; --layout {' or '.join(suits)} reads it"
     if ours == "t":
         return f"{text}; name the column of time with --map t=COLUMN, or say --sample-rate HZ"
     return f"{text}; say which it is with --map {ours}=COLUMN"
@@ -294,7 +322,7 @@ def _rotation(reading: _Reading) -> Floats | None:
         f"{rotation_forms.lean(R[0]):.1f}° from straight down at the start"
     )
     if assumed and form == "euler":
-        calmer = rotation_forms.calmer(values)
+        calmer = rotation_forms.calmer(values, R)
         if calmer is not None:
             reading.doubts.append(
                 f"the tool leaps between samples where {by} are read as Euler angles; it does not "

@@ -188,13 +188,15 @@ def unread(names: Sequence[str], taken: Sequence[str]) -> list[str]:
     return remarks
 
 
-def calmer(values: Floats) -> str | None:
+def calmer(values: Floats, R: Floats) -> str | None:
     """Tell a form in which angles taken for X-Y-Z ones do not leap between samples.
 
     Parameters
     ----------
     values : array, shape (T, 3)
         rad.
+    R : array, shape (T, 3, 3)
+        What they are as X-Y-Z ones.
 
     Returns
     -------
@@ -202,15 +204,18 @@ def calmer(values: Floats) -> str | None:
         None where they do not leap, or nothing else fits better.
     """
 
-    def leap(form: str) -> float:
-        R = matrices(form, values)
+    def leap(R: Floats) -> float:
         trace = np.einsum("tij,tij->t", R[1:], R[:-1])
         return float(np.arccos(np.clip((trace.min() - 1.0) / 2.0, -1.0, 1.0)))
 
-    largest = leap("XYZ")
+    if len(values) < 2:
+        return None
+    largest = leap(R)
     if largest < _LEAP:
         return None
-    return next((f for f in ("rotvec", "rpy") if leap(f) < _CALMER * largest), None)
+    return next(
+        (f for f in ("rotvec", "rpy") if leap(matrices(f, values)) < _CALMER * largest), None
+    )
 
 
 def lean(R: Floats) -> float:

@@ -7,7 +7,7 @@ their bytes, and a bad cell can still be shown as it stands in the file.
 import io
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ import pyarrow as pa
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import columns, parquet, untrusted
+from dmpcli.records import columns, list_columns, parquet, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.untrusted import decoder
 
@@ -176,7 +176,12 @@ def is_parquet(source: Source) -> bool:
 
 
 @decoder
-def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -> Table:
+def read(
+    source: Source,
+    names: Sequence[str] = (),
+    decimal: str | None = ".",
+    texts: Collection[str] | None = None,
+) -> Table:
     """Read a CSV or Parquet table whole.
 
     CSV files have a header line; the separator is that of ``, ; tab`` of which the header and the
@@ -190,6 +195,9 @@ def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -
         Of the columns in order, instead of a header line; further columns are named by number.
     decimal : {'.', ','}, optional
         None: commas where they stand between digits, no point does, and they do not separate.
+    texts : collection of str, optional
+        Columns that are wanted as they stand. Where this is said, others are parsed as numbers at
+        once if all of their cells are; without it every column is kept as text.
 
     Raises
     ------
@@ -198,7 +206,7 @@ def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -
     InputError
         Neither Parquet nor text, no rows, or lines of differing length.
     """
-    table = _parquet(source) if is_parquet(source) else _csv(source, names, decimal)
+    table = _parquet(source) if is_parquet(source) else _csv(source, names, decimal, texts)
     if len(table) == 0:
         raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
     return table
@@ -206,12 +214,15 @@ def read(source: Source, names: Sequence[str] = (), decimal: str | None = ".") -
 
 def _parquet(source: Source) -> Table:
     table = parquet.table(source)
-    return Table(
-        source.name, {name: table.column(name).combine_chunks() for name in table.column_names}
-    )
+    columns: dict[str, Any] = {}
+    for name in table.column_names:
+        columns |= list_columns.expanded(name, table.column(name).combine_chunks())
+    return Table(source.name, columns)
 
 
-def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
+def _csv(
+    source: Source, given: Sequence[str], decimal: str | None, texts: Collection[str] | None
+) -> Table:
     text, lines = counted_lines(source)
     end = text.find(b"\n") if b"\n" in text else len(text)
     separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
@@ -242,9 +253,69 @@ def _csv(source: Source, given: Sequence[str], decimal: str | None) -> Table:
         decimal = "," if comma else "."
         if comma:
             remarks.append("commas between digits read as decimal signs")
-    columns = body_columns(body, names, separator, lines, source.name)
-    rows = len(next(iter(columns.values()), ()))
-    return Table(source.name, columns, lines[:rows], decimal, tuple(remarks))
+    found = None
+    if texts is not None and decimal == ".":
+        found = _number_columns(body, names, separator, texts)
+    if found is None:
+        found = body_columns(body, names, separator, lines, source.name)
+    rows = len(next(iter(found.values()), ()))
+    return Table(source.name, found, lines[:rows], decimal, tuple(remarks))
+
+
+def _number_columns(
+    body: bytes, names: Sequence[str], separator: bytes, texts: Collection[str]
+) -> dict[str, Any] | None:
+    """Part the rows of a text table, with numbers parsed on the way: half of the time and memory.
+
+    A column is one of numbers if its first cell is, and not so large that a double could lose
+    digits of it, as of stamps that count from an epoch.
+
+    Returns
+    -------
+    dict or None
+        None where a cell of such a column is none, or no finite one: read as text, it can be shown
+        as it stands.
+    """
+    # Not by partition, which would copy all of the rest.
+    end = body.find(b"\n")
+    first = _cells(body[: end if end >= 0 else len(body)], separator)
+    kinds = {
+        name: pa.float64() if name not in texts and _is_small(cell) else pa.string()
+        for name, cell in zip(names, first, strict=False)
+    }
+    if len(first) != len(names) or pa.float64() not in kinds.values():
+        return None
+    try:
+        table = _parsed(body, names, separator, kinds)
+    except pa.ArrowInvalid:
+        return None
+    found = {name: table.column(name).combine_chunks() for name in table.column_names}
+    for name, kind in kinds.items():
+        if kind == pa.float64() and not np.isfinite(columns.numbers(found[name])).all():
+            return None
+    return found
+
+
+_EXACT = 1e6
+
+
+def _is_small(cell: str) -> bool:
+    return re.match(_NUMBER, cell) is not None and abs(float(cell)) <= _EXACT
+
+
+def _parsed(body: bytes, names: Sequence[str], separator: bytes, kinds: Mapping[str, Any]) -> Any:
+    from pyarrow import csv
+
+    return csv.read_csv(
+        io.BytesIO(body),
+        read_options=csv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
+        parse_options=csv.ParseOptions(
+            delimiter=separator.decode(), newlines_in_values=b'"' in body
+        ),
+        convert_options=csv.ConvertOptions(
+            column_types=kinds, strings_can_be_null=False, null_values=[]
+        ),
+    )
 
 
 def body_columns(
@@ -274,22 +345,11 @@ def body_columns(
     InputError
         No rows, or one of another length.
     """
-    from pyarrow import csv
-
     if not body:
         raise InputError(f"{name}: holds no rows; it needs a header and at least one row")
     # As text: numbers are parsed by column, so that a bad cell can be named with its line.
     try:
-        table = csv.read_csv(
-            io.BytesIO(body),
-            read_options=csv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
-            parse_options=csv.ParseOptions(
-                delimiter=separator.decode(), newlines_in_values=b'"' in body
-            ),
-            convert_options=csv.ConvertOptions(
-                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
-            ),
-        )
+        table = _parsed(body, names, separator, dict.fromkeys(names, pa.string()))
     except pa.ArrowInvalid as error:
         raise InputError(f"{name}: {_complaint(str(error), lines, len(names))}") from None
     return {key: table.column(key).combine_chunks() for key in table.column_names}

@@ -18,6 +18,9 @@ WORDS = (
     "urscript",
     "krl",
     "rapid",
+    "mcap",
+    "ros2",
+    "lerobot",
 )
 
 
@@ -33,12 +36,7 @@ class ExportOptions(Settings):
     ] = None
     orientation: Annotated[
         tuple[float, float, float] | None,
-        Option(
-            "Of the tool, where the file says none.",
-            "rad",
-            metavar="RX RY RZ",
-            unset="none is made up",
-        ),
+        Option("Of the tool, rad, where the file says none.", metavar="RX RY RZ", unset="none"),
     ] = None
     rate: Annotated[
         float | None,
@@ -71,4 +69,7 @@ class ExportOptions(Settings):
     tool: Annotated[
         Path | None,
         Option("Tool file: where the TCP is on the flange, and its weight.", unset="none"),
+    ] = None
+    task: Annotated[
+        str | None, Option("LeRobot: what is done, in words.", unset="by the file's kind")
     ] = None

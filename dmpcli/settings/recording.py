@@ -24,7 +24,19 @@ class RecordingOptions(Settings):
         str | None,
         Option(
             "Columns and units of a known recorder.",
-            choices=("ur", "tum", "ros", "euroc", "franka", "kuka", "fanuc", "motive"),
+            choices=(
+                "ur",
+                "tum",
+                "ros",
+                "euroc",
+                "franka",
+                "kuka",
+                "fanuc",
+                "motive",
+                "optitrack",
+                "lerobot",
+                "dmpcli",
+            ),
             unset="by its columns' names",
         ),
     ] = None
@@ -69,6 +81,13 @@ class RecordingOptions(Settings):
         str | None,
         Option("Rows with the same time.", choices=("error", "first", "mean"), unset="error"),
     ] = None
+    drop_duplicates: Annotated[
+        bool, Option("Of rows with the same time keep the first, as --repeated-stamps first.")
+    ] = False
+    episode: Annotated[
+        str | None,
+        Option("Which recording, where a file holds several.", metavar="NAME"),
+    ] = None
     decimal: Annotated[
         str | None,
         Option("Decimal sign.", choices=(".", ","), unset="recognised where it is plain"),
@@ -85,6 +104,10 @@ class RecordingOptions(Settings):
         from dmpcli.records import layouts
 
         known, columns = self.layout, self.columns
+        if self.drop_duplicates and self.repeated_stamps not in (None, "first"):
+            raise InputError(
+                f"--drop-duplicates and --repeated-stamps {self.repeated_stamps}: give one of them"
+            )
         said: dict[str, object] = {
             "body": self.body,
             "length": self.length_unit,
@@ -92,7 +115,8 @@ class RecordingOptions(Settings):
             "angle": self.angle_unit,
             "rotation": self.rotation,
             "sample_rate": self.sample_rate,
-            "repeated": self.repeated_stamps,
+            "repeated": "first" if self.drop_duplicates else self.repeated_stamps,
+            "episode": self.episode,
             "decimal": self.decimal,
         }
         said = {key: value for key, value in said.items() if value is not None}

@@ -38,6 +38,8 @@ def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> 
     alone = [name for name in of_programs if name in given and not chosen.program]
     if chosen.word != "gcode":
         alone += ["tilt"] if "tilt" in given else []
+    if chosen.word != "lerobot":
+        alone += ["task"] if "task" in given else []
     if chosen.word != "joints":
         alone += ["robot_model"] if "robot_model" in given else []
     if not (chosen.program or chosen.word == "joints") and "tool" in given:
@@ -47,7 +49,9 @@ def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> 
         raise InputError(f"{flag}: says nothing of {chosen.word}; leave it out")
     if chosen.word == "joints" and options.robot_model is None:
         raise InputError("--format joints: of which arm? Name it, as in --robot-model ec66")
-    if ID not in Path(output).name:
+    if chosen.folder:
+        file_io.check_folder(output)
+    elif ID not in Path(output).name:
         file_io.check_writable(output)
     return chosen
 
@@ -70,7 +74,7 @@ def export(motion: Motion, output: str | Path, chosen: FileFormat, options: Expo
     """
     prepared = _prepared(motion, chosen, options)
     name = Path(output).name
-    if ID in name:
+    if ID in name and not chosen.folder:
         for one in prepared.strokes:
             safe = "".join(c if c.isalnum() or c in "-_.+" else "_" for c in one.id)
             file = Path(output).with_name(name.replace(ID, safe))
@@ -92,8 +96,11 @@ def _prepared(motion: Motion, chosen: FileFormat, options: ExportOptions) -> Mot
                 f"--orientation: {motion.name} says how the tool is turned; leave it out"
             )
         motion = motion.turned(from_euler(np.array(options.orientation)))
-    if options.rate is not None:
-        motion = motions.evenly(motion, options.rate)
+    rate = options.rate
+    if chosen.word == "lerobot":
+        rate = float(_frames_per_second(motion, options))
+    if rate is not None:
+        motion = motions.evenly(motion, rate)
     if chosen.word == "joints":
         from dmpcli.formats.joint_table import with_joints
 
@@ -104,6 +111,9 @@ def _prepared(motion: Motion, chosen: FileFormat, options: ExportOptions) -> Mot
 
 
 def _write(motion: Motion, output: str | Path, chosen: FileFormat, options: ExportOptions) -> None:
+    if chosen.folder:
+        _folder(motion, Path(output), chosen, options)
+        return
     stem = NAME if str(output) == file_io.DASH else Path(output).name.split(".")[0]
     file_io.write(output, encoded(motion, chosen, options, stem))
 
@@ -115,6 +125,7 @@ def encoded(motion: Motion, chosen: FileFormat, options: ExportOptions, name: st
     ----------
     motion : Motion
     chosen : FileFormat
+        No folder.
     options : ExportOptions
     name : str
         Of a program.
@@ -124,6 +135,7 @@ def encoded(motion: Motion, chosen: FileFormat, options: ExportOptions, name: st
         gcode,
         joint_table,
         krl,
+        mcap_file,
         polylines,
         rapid,
         tum,
@@ -142,8 +154,32 @@ def encoded(motion: Motion, chosen: FileFormat, options: ExportOptions, name: st
         "joints": joint_table.encode,
         "ply": polylines.encode_ply,
         "obj": polylines.encode_obj,
+        "mcap": mcap_file.encode,
     }
     return tables[chosen.word](motion)
+
+
+def _folder(motion: Motion, output: Path, chosen: FileFormat, options: ExportOptions) -> None:
+    if chosen.word == "ros2":
+        from dmpcli.formats import ros_bag
+
+        ros_bag.write(motion, output)
+        return
+    from dmpcli.formats import lerobot_dataset
+
+    task = options.task or f"{motion.kind} of dmpcli"
+    lerobot_dataset.write(motion, output, _frames_per_second(motion, options), task)
+
+
+def _frames_per_second(motion: Motion, options: ExportOptions) -> int:
+    """Return the rate of a dataset's grid: as said, else the file's own, a whole number of Hz."""
+    rate = options.rate
+    if rate is None:
+        rate = 1.0 / float(np.median(np.concatenate([np.diff(one.t) for one in motion.strokes])))
+    whole = max(1, round(rate))
+    if options.rate is not None and whole != options.rate:
+        raise InputError(f"--rate {rate:g}: LeRobot's rate is a whole number of Hz")
+    return whole
 
 
 def program_options(options: ExportOptions) -> ProgramOptions:

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
+from dmpcli.records import layouts
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import LAYOUTS, Layout, adapted, suited
 from dmpcli.records.recordings import read
@@ -116,14 +117,27 @@ def test_each_known_recorder_is_read_by_one_word(name):
 
 
 @pytest.mark.parametrize("name", [n for n in FILES if not n.startswith(("tum", "euroc", "motive"))])
-def test_without_the_word_the_refusal_names_it(name):
+def test_without_the_word_the_one_that_fits_is_recognised_and_said(name):
     layout, text = FILES[name]
-    assert suited(text.splitlines()[0].split(" " if layout == "ur" else ","))[0] == layout
-    if name not in ("kuka", "fanuc"):  # these have a t, but not our x
-        with pytest.raises(
-            InputError, match=f"column 't' is missing; .*--layout {layout} reads it"
-        ):
-            taken(text)
+    assert suited(text.splitlines()[0].split(" " if layout == "ur" else ",")) == [layout]
+    found = read(Source("log.csv", text.encode()))
+    assert_is_the_stroke(found)
+    assert found.told[0].startswith(f"recognised as --layout {layout}; ")
+
+
+def test_where_two_layouts_could_be_none_is_taken(monkeypatch):
+    _, text = FILES["kuka"]
+    twin = layouts.LAYOUTS | {"other": layouts.LAYOUTS["kuka"]}
+    monkeypatch.setattr(layouts, "LAYOUTS", twin)
+    with pytest.raises(InputError, match=r"column 'x' is missing.* --layout kuka or other reads"):
+        taken(text)
+
+
+def test_an_option_of_a_recognised_table_counts():
+    _, text = FILES["ur"]
+    found = read(Source("log.csv", text.encode()), adapted(Layout(), (), {"length": "mm"}))
+    assert found.told[0].startswith("recognised as --layout ur")
+    assert np.ptp(found.stroke.position) < np.ptp(taken(text, "ur").stroke.position) / 100
 
 
 @pytest.mark.parametrize(
@@ -133,7 +147,6 @@ def test_without_the_word_the_refusal_names_it(name):
         ("tum, commented head", "names of the columns are commented out; --layout tum reads them"),
         ("euroc", "names of the columns are commented out; --layout euroc reads them"),
         ("motive", "is an export of Motive; --layout motive reads it"),
-        ("kuka", "column 'x' is missing; .*--layout kuka reads it"),
     ],
 )
 def test_a_table_without_names_of_its_own_is_refused_with_what_reads_it(name, message):

@@ -41,7 +41,7 @@ def command_of(name):
 
 def declared(name):
     """The settings that are options of a command, each as its model declares it."""
-    module = importlib.import_module(f"dmpcli.commands.{name}")
+    module = importlib.import_module(cli.module_of(name))
     for parameter in inspect.signature(inspect.unwrap(module.command)).parameters.values():
         kind, only = parameter.annotation, None
         if get_origin(kind) is Annotated and isinstance(get_args(kind)[1], Only):
@@ -101,7 +101,7 @@ def test_help_states_unit_and_default_of_every_option(command, one):
 @pytest.mark.parametrize("command", cli.COMMANDS)
 def test_every_number_is_declared_in_a_model_with_a_unit_and_a_default(command):
     models = {one.name: one for one in declared(command)}
-    module = importlib.import_module(f"dmpcli.commands.{command}")
+    module = importlib.import_module(cli.module_of(command))
     for name, one in inspect.signature(module.command).parameters.items():
         kind = get_args(one.annotation)[0]
         if kind in (int, float) or {int, float} & {*get_args(kind)}:

@@ -1,0 +1,296 @@
+"""`import`: recordings, drawings and programs of others in, demonstrations out."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dmpcli.errors import InputError, counted
+from dmpcli.formats import detect
+from dmpcli.formats.motion import MotionStroke
+from dmpcli.messages import tell
+from dmpcli.records import file_io, record, schemas, suffixes
+from dmpcli.records.file_io import Source
+from dmpcli.records.layouts import Layout
+from dmpcli.records.record import Provenance, Record, input_of
+from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
+from dmpcli.settings.import_file import ImportOptions
+from dmpcli.spatial.rotations import interpolate, to_euler_continuous
+from dmpcli.workflows.recording import recording
+
+NAME, ID = "{name}", "{id}"
+"""In the name of an output: the input's, without suffix, and that of each of its strokes."""
+
+TABLE = "table"
+
+
+def check(files: Sequence[Path], output: Path) -> None:
+    """Refuse an output that could not hold what comes, before anything is read.
+
+    Raises
+    ------
+    InputError
+    """
+    suffixes.check(output, suffixes.PARQUET)
+    if len(files) > 1 and NAME not in output.name:
+        raise InputError(
+            f"-o {output}: {len(files)} recordings need a file each; put {NAME} into the name"
+        )
+    stems = [stem_of(file) for file in files]
+    twice = next((stem for i, stem in enumerate(stems) if stem in stems[:i]), None)
+    if twice is not None:
+        raise InputError(f"two inputs are called {twice}; import them one by one")
+    if NAME not in output.name and ID not in output.name:
+        file_io.check_writable(output)
+
+
+def stem_of(file: Path) -> str:
+    """Return an input's name without suffix."""
+    return "stdin" if str(file) == file_io.DASH else file.stem
+
+
+def import_file(
+    file: Path,
+    output: Path,
+    options: ImportOptions,
+    form: Layout | None,
+    given: Mapping[str, Any],
+) -> None:
+    """Read one file, and write its strokes as demonstrations.
+
+    Parameters
+    ----------
+    file : Path
+    output : Path
+    options : ImportOptions
+    form : Layout, optional
+        How a table is read.
+    given : mapping
+        What the command line itself says.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, holds several strokes for one output, or an option says nothing of it.
+    """
+    kind, strokes, inputs = _read(file, options, form, given)
+    name = file_io.shown(file)
+    if len(strokes) > 1 and ID not in output.name:
+        names = ", ".join(one.id for one in strokes[:8])
+        raise InputError(
+            f"{name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
+            f"NAME, or put {ID} into the name of the output for a file of each"
+        )
+    said: dict[str, Any] = {"format": kind}
+    if form is not None:
+        said["layout"] = form.as_options()
+    if kind != TABLE:
+        said |= {k: v for k, v in options.as_options().items() if k in _OPTIONS[kind]}
+    for one in strokes:
+        place = output
+        if output.name != file_io.DASH:
+            own = output.name.replace(NAME, stem_of(file)).replace(ID, _safe(one.id))
+            place = output.with_name(own)
+        file_io.write(place, record.encode(demonstration(one, inputs, said)))
+        shown = file_io.shown(place, output=True)
+        tell(f"{shown}: {counted(len(one), 'sample')}, {one.duration:.3f} s, from {kind}")
+
+
+def _read(
+    file: Path, options: ImportOptions, form: Layout | None, given: Mapping[str, Any]
+) -> tuple[str, list[MotionStroke], list[dict[str, str]]]:
+    """Return a file's kind, its strokes, and the entries of `Provenance.inputs`."""
+    episode = None if form is None else form.episode
+    kind = None if str(file) == file_io.DASH else detect.kind_of_path(file)
+    if kind is not None:
+        if options.format not in (None, kind):
+            raise InputError(f"--format {options.format}: {file} is {kind}; leave it out")
+        _check_given(kind, given)
+        stroke, told = _streamed(file, kind, form, episode)
+        for line in told:
+            tell(f"{file}: {line}")
+        return kind, [stroke], _hashes(file)
+    source = file_io.read(file)
+    kind = options.format or detect.kind_of(source)
+    if kind in _STREAMED:
+        raise InputError(f"--format {kind}: {source.name} is none")
+    _check_given(kind, given)
+    strokes = strokes_of(source, kind, options, form)
+    if episode is not None and kind != TABLE:
+        known = [one.id for one in strokes]
+        strokes = [one for one in strokes if one.id == episode]
+        if not strokes:
+            raise InputError(f"--episode {episode}: {source.name} has {', '.join(known[:10])}")
+    return kind, strokes, [input_of("recording", source)]
+
+
+_STREAMED = ("mcap", "ros2", "lerobot")
+
+
+def _streamed(
+    file: Path, kind: str, form: Layout | None, episode: str | None
+) -> tuple[MotionStroke, list[str]]:
+    """Read what is not read whole."""
+    body = None if form is None else form.body
+    if kind == "lerobot":
+        from dmpcli.formats import lerobot_dataset
+
+        if body is not None:
+            raise InputError("--body: says nothing of a lerobot dataset; leave it out")
+        return lerobot_dataset.read(file, episode)
+    if episode is not None:
+        raise InputError(f"--episode: says nothing of {kind}; --body chooses a topic or frame")
+    if kind == "mcap":
+        from dmpcli.formats import mcap_file
+
+        return mcap_file.read(file, str(file), body)
+    from dmpcli.formats import ros_bag
+
+    return ros_bag.read(file, body)
+
+
+def _hashes(path: Path) -> list[dict[str, str]]:
+    """Entries of `Provenance.inputs` of a file or of all files of a folder, in order."""
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    found = []
+    for file in files:
+        with file.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        found.append({"role": "recording", "sha256": digest})
+    return found
+
+
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    TABLE: (),
+    "svg": ("speed", "lift", "tolerance", "rate"),
+    "gcode": ("tolerance", "rate", "travel_speed"),
+    "urscript": ("rate",),
+    "krl": ("rate",),
+    "rapid": ("rate",),
+    "mcap": (),
+    "ros2": (),
+    "lerobot": (),
+}
+_OF_TABLES = (
+    "layout",
+    "map_",
+    "columns",
+    "time_unit",
+    "angle_unit",
+    "rotation",
+    "sample_rate",
+    "repeated_stamps",
+    "drop_duplicates",
+    "decimal",
+)
+
+
+def _check_given(kind: str, given: Mapping[str, Any]) -> None:
+    """Refuse options that say nothing of a kind of file."""
+    own = {name for names in _OPTIONS.values() for name in names} - set(_OPTIONS[kind])
+    alone = [name for name in given if name in own]
+    if kind != TABLE:
+        alone += [name for name in given if name in _OF_TABLES]
+        alone += ["body"] if "body" in given and kind not in ("mcap", "ros2") else []
+        alone += ["length_unit"] if "length_unit" in given and kind != "svg" else []
+    if alone:
+        flag = f"--{alone[0].rstrip('_').replace('_', '-')}"
+        raise InputError(f"{flag}: says nothing of a {kind} file; leave it out")
+
+
+def strokes_of(
+    source: Source, kind: str, options: ImportOptions, form: Layout | None = None
+) -> list[MotionStroke]:
+    """Return the strokes of a file of some kind.
+
+    Parameters
+    ----------
+    source : Source
+    kind : str
+        Of `settings.import_file.KINDS`.
+    options : ImportOptions
+    form : Layout, optional
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    if kind == TABLE:
+        stroke = recording(source, form)
+        return [MotionStroke(stroke.t, stroke.position, stroke.rotation)]
+    if kind == "svg":
+        from dmpcli.formats import svg_paths
+
+        unit = None if form is None or "length" not in form.said else form.length
+        drawn, told = svg_paths.decode(
+            source, options.speed, options.lift, options.tolerance, options.rate, unit
+        )
+        for line in told:
+            tell(f"{source.name}: {line}")
+        return [drawn]
+    if kind == "gcode":
+        from dmpcli.formats import gcode
+
+        strokes = gcode.decode(source, options.tolerance, options.travel_speed)
+    else:
+        from dmpcli.formats import krl, rapid, urscript
+
+        readers = {"urscript": urscript.decode, "krl": krl.decode, "rapid": rapid.decode}
+        strokes = readers[kind](source)
+    return [sampled(one, options.rate, source.name) for one in strokes]
+
+
+MOST_SAMPLES = 5_000_000
+
+
+def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
+    """Return the straight motion of a program at even times, its corners among them.
+
+    Parameters
+    ----------
+    one : MotionStroke
+        Its corners.
+    rate : float
+        Hz; between two corners the samples are even, and at least so many.
+    name : str
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        It takes too long.
+    """
+    if one.duration * rate > MOST_SAMPLES:
+        raise InputError(
+            f"{name}: takes {one.duration:.0f} s, too many samples; give a lower --rate"
+        )
+    counts = np.maximum(np.ceil(np.diff(one.t) * rate - 1e-6).astype(int), 1)
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    t = np.interp(np.arange(ends[-1] + 1), ends, one.t)
+    t = t[np.concatenate([[True], np.diff(t) > 0.0])]
+    position = np.column_stack([np.interp(t, one.t, axis) for axis in one.position.T])
+    R = None if one.rotation is None else interpolate(one.t, np.asarray(one.rotation), t)
+    return replace(one, t=t, position=position, rotation=R)
+
+
+def demonstration(
+    one: MotionStroke, inputs: Sequence[dict[str, str]], options: dict[str, Any]
+) -> Record:
+    """Return the record of a stroke that came in."""
+    columns: dict[str, Any] = {"t": np.asarray(one.t, dtype=float)}
+    columns |= dict(zip(POSITION, np.asarray(one.position, dtype=float).T, strict=True))
+    if one.rotation is not None:
+        angles = to_euler_continuous(np.asarray(one.rotation))
+        columns |= dict(zip(EULER_ANGLES, angles.T, strict=True))
+    if one.wrench is not None:
+        columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
+    origin = Provenance("import", options, tuple(inputs))
+    return Record(schemas.DEMONSTRATION, columns, origin)
+
+
+def _safe(name: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_.+" else "_" for c in name)
