@@ -4,11 +4,14 @@
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make test        tests, lint, types and import rules
 #   make test-quick  the quick half of the tests
+#   make lint        ruff, mypy and import-linter
+#   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
 #   make dist        sdist and wheel, checked, and the wheel tried in an environment without extras
 #   make lock        the lock files, from pyproject.toml
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
+#   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
@@ -35,8 +38,8 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak cluster-demo \
-    samples pictures schemas clean FORCE
+.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers faults \
+    soak cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -61,6 +64,10 @@ test: $(VENV)/installed
 
 test-quick: $(VENV)/installed
 	$(PYTEST) -m "not slow"
+
+coverage: export COVERAGE_FILE := $(CACHE)/coverage
+coverage: $(VENV)/installed
+	$(PYTEST) -m "not slow" --cov=dmpcli --cov-report=term:skip-covered --cov-report=html:$(OUT)/coverage
 
 # The lowest versions that pyproject.toml allows.
 test-lowest:
@@ -109,6 +116,12 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
+
+# One seed replays one failure: python -m tests.faults --seed N.
+SEEDS ?= 10000
+
+faults: $(VENV)/installed
+	$(BIN)/python -m tests.faults --seeds $(SEEDS)
 
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak

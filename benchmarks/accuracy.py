@@ -15,10 +15,10 @@ from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.skill import Skill
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.paper_values import EXPERIMENTS, REPRODUCTION, Experiment
 from dmpcli.metrics.wave_height import stroke_wave
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 
 UP = np.array([0.0, 0.0, 1.0])
 PAPER = FitOptions(alpha_1=1.7, widths="power", learning="paper")
@@ -35,13 +35,13 @@ ROWS = {
 }
 
 
-def reference() -> SmoothedStroke:
+def reference() -> Trajectory:
     """Return the paper's stroke without hand, sensor or servo, 50 Hz."""
     t = np.linspace(0.0, 10.0, 501)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
     position = reference_paths.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
     down = rotations.from_euler(np.tile([np.pi, 0.0, 0.0], (501, 1)))
-    return SmoothedStroke(t, position, down)
+    return Trajectory(t, position, down)
 
 
 def height(position: Floats, experiment: Experiment, normal: Floats) -> float:

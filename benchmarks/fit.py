@@ -27,9 +27,9 @@ from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.preprocessing import preprocess
 from dmpcli.dmp.regression import BandedRegression
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.paper_values import REPRODUCTION
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from tests import cases
 
 RUNS = 200
@@ -48,19 +48,19 @@ def milliseconds(task: Callable[[], object], runs: int = RUNS) -> tuple[float, f
     return float(np.median(times)), min(times)
 
 
-def reference() -> SmoothedStroke:
+def reference() -> Trajectory:
     """Return the paper's stroke with a turning tool, 500 samples."""
     t = np.linspace(0.0, 10.0, 500)
     angles = np.stack([np.pi + 0.1 * np.sin(t), 0.1 * np.cos(t) - 0.1, 0.05 * t], axis=1)
     start, goal = np.array(REPRODUCTION.start), np.array(REPRODUCTION.goal)
     position = reference_paths.sine(start, goal, REPRODUCTION.demonstration, t, 10.0)
-    return SmoothedStroke(t, position, rotations.from_euler(angles))
+    return Trajectory(t, position, rotations.from_euler(angles))
 
 
-def letters() -> SmoothedStroke:
+def letters() -> Trajectory:
     """Return thirty cursive letters."""
     table = cases.letters()
-    return SmoothedStroke(table[:, 0], table[:, 1:4])
+    return Trajectory(table[:, 0], table[:, 1:4])
 
 
 def short() -> None:

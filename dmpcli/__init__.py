@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dmpcli.surfaces.plane import Plane
     from dmpcli.surfaces.sphere import Sphere
     from dmpcli.workflows.library import fit, generalize, read, read_surface, write
-    from dmpcli.workflows.report import Report
+    from dmpcli.workflows.report import StrokeReport
     from dmpcli.workflows.reports import inspect, report, wave_heights
     from dmpcli.workflows.runs import execute, record
     from dmpcli.workflows.values import Demonstration, Run, TrajectoryBatch
@@ -33,7 +33,7 @@ _HOMES = {
     "Plane": "surfaces.plane",
     "Sphere": "surfaces.sphere",
     "Demonstration": "workflows.values",
-    "Report": "workflows.report",
+    "StrokeReport": "workflows.report",
     "Run": "workflows.values",
     "TrajectoryBatch": "workflows.values",
     "execute": "workflows.runs",
@@ -57,10 +57,10 @@ __all__ = [
     "Mesh",
     "Plane",
     "RefusedError",
-    "Report",
     "Run",
     "Skill",
     "Sphere",
+    "StrokeReport",
     "Trajectory",
     "TrajectoryBatch",
     "__version__",

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.spatial.trajectory import Trajectory
 
 
 def folder() -> Path:
@@ -24,11 +24,11 @@ def shapes() -> list[str]:
 
 
 @cache
-def strokes(shape: str) -> list[SmoothedStroke]:
+def strokes(shape: str) -> list[Trajectory]:
     """Return the seven strokes of a shape, drawn in the plane z = 0, taken as mm."""
     data = loadmat(folder() / f"{shape}.mat", squeeze_me=True, struct_as_record=False)
     return [
-        SmoothedStroke(
+        Trajectory(
             np.asarray(demo.t, dtype=float),
             np.column_stack([np.asarray(demo.pos, dtype=float).T, np.zeros(len(demo.t))]),
         )

@@ -270,7 +270,8 @@ def say(text: str) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        main(*map(Path, sys.argv[1:4]), *sys.argv[4:])
+        folder, locked, outputs, *how = sys.argv[1:]
+        main(Path(folder), Path(locked), Path(outputs), *how)
     except SetUpError as error:
         say(str(error))
         sys.exit(1)

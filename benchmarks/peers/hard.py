@@ -12,8 +12,8 @@ from benchmarks.peers.models import D, K
 from dmpcli.arrays import Floats
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.deviation import nearest_rms
+from dmpcli.spatial.trajectory import Trajectory
 from tests import cases, human_strokes
 
 STEP = 1e-3
@@ -47,7 +47,7 @@ def strokes() -> dict[str, tuple[Floats, Floats]]:
 
 def ours(t: Floats, position: Floats, choices: FitOptions) -> tuple[int, Floats]:
     """N, and the reproduction (S, 3)."""
-    result = fit([SmoothedStroke(t, position)], choices)
+    result = fit([Trajectory(t, position)], choices)
     frame = result.skill.frame
     return len(result.skill.basis), (
         frame.start + result.reproductions[0].reproduced @ frame.axes.T

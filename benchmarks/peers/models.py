@@ -15,8 +15,8 @@ from dmpcli.arrays import Floats
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions, Method, Orientation
 from dmpcli.dmp.rollout import Pairs, curves, poses
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.plane import pair_charts
 
 BASIS, K, D = 80, 100.0, 20.0
@@ -201,7 +201,7 @@ class Ours:
         self.name = f"dmpcli, --orientation {orientation}"
 
     def fit(self, t: Floats, Y: Floats) -> None:
-        stroke = SmoothedStroke(t, Y[:, :3], rotations.from_euler(Y[:, 3:]))
+        stroke = Trajectory(t, Y[:, :3], rotations.from_euler(Y[:, 3:]))
         self.t = t
         self.result = fit([stroke], FitOptions(damping=D, basis=BASIS, regression=self.regression))
 

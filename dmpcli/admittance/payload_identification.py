@@ -24,15 +24,13 @@ from dmpcli.dmp.options import CONDITION
 from dmpcli.errors import RefusedError
 from dmpcli.spatial import wrench
 from dmpcli.spatial.rotations import log, skew
+from dmpcli.spatial.wrench import LEVER
 
 FEWEST = 3
 """Orientations about different axes that the six unknowns of either system need."""
 
 SAME = 0.02
 """Orientations nearer to each other than this, rad, count as one."""
-
-LEVER = 0.1
-"""m: a torque counts as much as the force that has it at this lever, about a tool's length."""
 
 DRIFT = 6
 """Poses from which a drift is looked for."""

@@ -20,8 +20,8 @@ from dmpcli.dmp.tool_speed import LEAST_HELD, held
 from dmpcli.errors import InputError
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.records import file_io, record, trajectory
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Form, Provenance, Record
+from dmpcli.records.schemas import OK
 from dmpcli.surfaces.surface import LEAVES, Status, Surface
 
 

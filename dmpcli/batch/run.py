@@ -16,8 +16,9 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.time_scaling import timing
 from dmpcli.errors import RefusedError
 from dmpcli.records import manifest, trajectory
-from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Record
+from dmpcli.records.schemas import OK
 from dmpcli.surfaces.plane import Plane, pair_charts
 
 _AT_ONCE = 100_000

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from dmpcli.admittance.payload_identification import LEVER, Identification, identify
+from dmpcli.admittance.payload_identification import Identification, identify
 from dmpcli.arrays import Floats
 from dmpcli.calibration.resting import STILL, STILL_ANGLE, at_rest
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.records.tool import SensorIdentity
-from dmpcli.spatial.wrench import Tool
+from dmpcli.spatial.wrench import LEVER, Tool
 
 UNSTEADY = 0.2
 """N: a pose whose force changes by more than this while it is read swings, or is being touched."""

@@ -22,13 +22,11 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, PlannedStroke
+from dmpcli.planning.plan import Plan, PlannedStroke, Pose
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.settings.calibrate import CalibrateSettings
 
 _TRIES = 3
-
-Pose = tuple[Floats, Floats]
 
 
 class Interrupted(Exception):  # noqa: N818

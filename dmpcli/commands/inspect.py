@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from dmpcli.errors import InputError
+from dmpcli.messages import on_terminal
 
 _WIDTH = 80
 
@@ -28,6 +29,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what a file is: schema, columns, units, ranges, provenance."""
+    on_terminal(quiet=False)
     from dmpcli.records import file_io
     from dmpcli.reporting import inspection
 

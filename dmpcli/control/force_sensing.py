@@ -7,11 +7,10 @@ motion, as is silence. Between two samples a loop goes on; without a fresh one i
 import numpy as np
 
 from dmpcli.admittance.compensation import rest_zero
-from dmpcli.admittance.payload_identification import LEVER
 from dmpcli.arrays import Floats, finite, within
 from dmpcli.errors import InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import Clock, Sample, Sensor, SensorInfo
-from dmpcli.spatial.wrench import Tool
+from dmpcli.spatial.wrench import LEVER, Tool
 
 SILENCE = 0.1
 """s without a sample, after which the sensor counts as dead."""

@@ -12,8 +12,8 @@ from dmpcli.errors import InputError
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.records import file_io, record, schemas
 from dmpcli.records.file_io import Source
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
+from dmpcli.records.schemas import OK
 from dmpcli.records.trajectory_reader import rows_by_id, stored
 
 NAMED = 5

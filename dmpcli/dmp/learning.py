@@ -25,10 +25,11 @@ from dmpcli.dmp.paper_learning import fit_as_paper
 from dmpcli.dmp.paper_preprocessing import Prepared
 from dmpcli.dmp.preprocessing import Preprocessed, preprocess
 from dmpcli.dmp.skill import Accuracy, DemonstrationSpread, Skill, TaughtSurface
-from dmpcli.dmp.smoothing import Signal, SmoothedStroke
+from dmpcli.dmp.smoothing import Signal
 from dmpcli.dmp.taught_strokes import TaughtStroke, mean_frame, taught_strokes
 from dmpcli.dmp.transformation_system import TransformationGains, critical
 from dmpcli.errors import InputError
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces import plane
 from dmpcli.surfaces.surface import Surface
 
@@ -43,7 +44,7 @@ _DOUBT, _OUTLYING = 3.0, 4.5
 
 
 def fit(
-    strokes: Sequence[SmoothedStroke],
+    strokes: Sequence[Trajectory],
     choices: FitOptions,
     surface: Surface | None = None,
     taught: TaughtSurface | None = None,
@@ -52,7 +53,7 @@ def fit(
 
     Parameters
     ----------
-    strokes : sequence of SmoothedStroke
+    strokes : sequence of Trajectory
         At least one; all with orientation or all without.
     choices : FitOptions
     surface : Surface, optional
@@ -308,7 +309,7 @@ def _prepared(demonstration: TaughtStroke, closed: bool) -> Prepared:
     rotation = None if seen.rotation is None else seen.rotation(t)
     curve = demonstration.curve
     return Prepared(
-        SmoothedStroke(t, position, rotation),
+        Trajectory(t, position, rotation),
         Signal(curve(t), curve(t, 1), curve(t, 2)),
         demonstration.frame,
         closed,

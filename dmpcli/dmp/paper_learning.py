@@ -16,8 +16,9 @@ from dmpcli.dmp.options import PAPER_BASIS, FitOptions, Model
 from dmpcli.dmp.paper_preprocessing import Prepared, check_alike, prepare
 from dmpcli.dmp.regression import METHODS, target_forcing
 from dmpcli.dmp.skill import Response, Skill
-from dmpcli.dmp.smoothing import Signal, SmoothedStroke
+from dmpcli.dmp.smoothing import Signal
 from dmpcli.dmp.transformation_system import TransformationGains, critical
+from dmpcli.spatial.trajectory import Trajectory
 
 # An axis whose |g - x0| is below this part of the stroke's extent cannot carry the factor of (7).
 NEARLY_ZERO = 1e-3
@@ -25,7 +26,7 @@ NEARLY_ZERO = 1e-3
 _NEGLIGIBLE = 1e-9
 
 
-def fit_as_paper(strokes: Sequence[SmoothedStroke], choices: FitOptions) -> Fit:
+def fit_as_paper(strokes: Sequence[Trajectory], choices: FitOptions) -> Fit:
     """Learn one skill from one or several demonstrations.
 
     Each demonstration is taken in its own chart, its time as t/T_i, its length along u scaled to
@@ -33,7 +34,7 @@ def fit_as_paper(strokes: Sequence[SmoothedStroke], choices: FitOptions) -> Fit:
 
     Parameters
     ----------
-    strokes : sequence of SmoothedStroke
+    strokes : sequence of Trajectory
         At least one; all open or all closed, all with orientation or all without.
     choices : FitOptions
 

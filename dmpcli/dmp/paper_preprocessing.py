@@ -13,9 +13,10 @@ from dmpcli.dmp import smoothing
 from dmpcli.dmp.options import PAPER_BASIS, FitOptions
 from dmpcli.dmp.preprocessing import Preprocessed
 from dmpcli.dmp.skill import TaskFrame
-from dmpcli.dmp.smoothing import Signal, SmoothedStroke
+from dmpcli.dmp.smoothing import Signal
 from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces import plane
 
 
@@ -25,7 +26,7 @@ class Prepared:
 
     Attributes
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         Smoothed, trimmed, even, from t = 0.
     signal : Signal
         The skill's six coordinates and derivatives, shape (T, 6).
@@ -43,7 +44,7 @@ class Prepared:
         What was found in the recording; None of the paper's learning.
     """
 
-    stroke: SmoothedStroke
+    stroke: Trajectory
     signal: Signal
     frame: TaskFrame
     closed: bool
@@ -54,12 +55,12 @@ class Prepared:
     seen: Preprocessed | None = None
 
 
-def prepare(stroke: SmoothedStroke, choices: FitOptions) -> Prepared:
+def prepare(stroke: Trajectory, choices: FitOptions) -> Prepared:
     """Smooth and trim a demonstration, find its chart, and bring it there.
 
     Parameters
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
     choices : FitOptions
         With N.
 
@@ -100,7 +101,7 @@ def prepare(stroke: SmoothedStroke, choices: FitOptions) -> Prepared:
         x[:, 3:] = rotations.to_euler_continuous(E @ E[0].T)
     removed = np.sum((position - even.position[part]) ** 2, axis=1)
     return Prepared(
-        SmoothedStroke(t, position, rotation),
+        Trajectory(t, position, rotation),
         smoothing.differentiated(t, x),
         TaskFrame(position[0], position[-1], axes, first),
         plane.is_closed(position),

@@ -11,11 +11,11 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.dmp import noise, segmentation, spline_smoothing, time_base
 from dmpcli.dmp.segmentation import Span
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.dmp.spline_smoothing import SmoothSpline
 from dmpcli.dmp.time_base import continuous_quaternions
 from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 
 # Fewer samples are no stroke.
 FEWEST = 10
@@ -30,7 +30,7 @@ class Preprocessed:
 
     Attributes
     ----------
-    raw : SmoothedStroke
+    raw : Trajectory
         Even samples, cut and trimmed, from t = 0; not smoothed. What a skill is judged by.
     position : SmoothSpline
         mm, over [0, duration].
@@ -50,7 +50,7 @@ class Preprocessed:
         Whether uneven steps were interpolated.
     """
 
-    raw: SmoothedStroke
+    raw: Trajectory
     position: SmoothSpline
     quaternion: SmoothSpline | None
     trimmed: Span
@@ -109,7 +109,7 @@ class Preprocessed:
 
 
 def preprocess(
-    stroke: SmoothedStroke,
+    stroke: Trajectory,
     *,
     cutoff: float | None = None,
     trim: bool = True,
@@ -121,7 +121,7 @@ def preprocess(
 
     Parameters
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         As recorded.
     cutoff : float, optional
         Hz, instead of the one that follows from the noise.
@@ -207,7 +207,7 @@ def _check_moves(position: Floats) -> None:
         raise InputError("the tool does not move; record a stroke")
 
 
-def _check_enough(part: SmoothedStroke, start: float | None, until: float | None) -> None:
+def _check_enough(part: Trajectory, start: float | None, until: float | None) -> None:
     if len(part.t) < FEWEST:
         span = " ".join(
             f"{word} {value:g} s"

@@ -13,8 +13,8 @@ from dmpcli.dmp.paper_learning import rolled_out
 from dmpcli.dmp.paper_preprocessing import prepare
 from dmpcli.dmp.preprocessing import Preprocessed
 from dmpcli.dmp.skill import Skill
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.dmp.taught_strokes import TaughtStroke
+from dmpcli.spatial.trajectory import Trajectory
 
 # Samples of both that are compared.
 _MOST = 8001
@@ -41,14 +41,14 @@ def recalled(skill: Skill, taught: TaughtStroke) -> Quality:
 
 
 def recalled_as_paper(
-    skill: Skill, recording: SmoothedStroke, seen: Preprocessed, choices: FitOptions
+    skill: Skill, recording: Trajectory, seen: Preprocessed, choices: FitOptions
 ) -> Quality:
     """Hold a skill learned as the paper has it against one of its recordings.
 
     Parameters
     ----------
     skill : Skill
-    recording : SmoothedStroke
+    recording : Trajectory
         As it was recorded.
     seen : Preprocessed
         The same, smoothed by its noise.

@@ -10,7 +10,8 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.dmp.noise import Noise
-from dmpcli.dmp.smoothing import IDLE_MARGIN, REST_SPEED, SmoothedStroke
+from dmpcli.dmp.smoothing import IDLE_MARGIN, REST_SPEED
+from dmpcli.spatial.trajectory import Trajectory
 
 # Means over so long, s, and standard deviations of theirs by which a tool has left its place.
 _MEAN = 0.1
@@ -61,12 +62,12 @@ class Segments:
     retract: Span | None
 
 
-def segment(stroke: SmoothedStroke, noise: Noise) -> Segments:
+def segment(stroke: Trajectory, noise: Noise) -> Segments:
     """Find the parts of an even recording.
 
     Parameters
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         Even, from t = 0.
     noise : Noise
         Of its positions.
@@ -90,23 +91,23 @@ def segment(stroke: SmoothedStroke, noise: Noise) -> Segments:
     )
 
 
-def moving_part(stroke: SmoothedStroke, noise: Noise) -> slice:
+def moving_part(stroke: Trajectory, noise: Noise) -> slice:
     """Samples of an even stroke between the idle ends, `IDLE_MARGIN` of it added at both."""
     motion = _motion(stroke, noise)
     return _moving(motion, _core(motion))
 
 
 def cut(
-    stroke: SmoothedStroke,
+    stroke: Trajectory,
     start: float | None = None,
     until: float | None = None,
     pauses: Sequence[Span] = (),
-) -> SmoothedStroke:
+) -> Trajectory:
     """Cut an even stroke, and close up its pauses.
 
     Parameters
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         Even, from t = 0.
     start, until : float, optional
         s.
@@ -132,7 +133,7 @@ def cut(
     if kept.all():
         return stroke
     count = int(kept.sum())
-    return SmoothedStroke(
+    return Trajectory(
         np.linspace(0.0, step * max(count - 1, 0), count),
         stroke.position[kept],
         None if stroke.rotation is None else stroke.rotation[kept],
@@ -168,7 +169,7 @@ class _Motion:
         return _Motion(self.position[::-1], self.speed[::-1], self.step, self.width, self.sigma)
 
 
-def _motion(stroke: SmoothedStroke, noise: Noise) -> _Motion:
+def _motion(stroke: Trajectory, noise: Noise) -> _Motion:
     count = len(stroke.t)
     step = float(stroke.t[-1]) / (count - 1)
     half = min(int(0.5 * _MEAN / step), (count - 1) // 4)
@@ -285,7 +286,7 @@ def _stay(motion: _Motion, begin: int, end: int, hidden: float) -> tuple[int, in
 
 
 def _sharp(
-    stroke: SmoothedStroke, motion: _Motion, noise: Noise, pause: tuple[int, int]
+    stroke: Trajectory, motion: _Motion, noise: Noise, pause: tuple[int, int]
 ) -> tuple[int, int]:
     """Pause whose ends are told by samples: a mean moves before its middle does."""
     a, b = pause
@@ -299,7 +300,7 @@ def _sharp(
     return a, b
 
 
-def _strays(stroke: SmoothedStroke, motion: _Motion, part: slice) -> tuple[int | None, int | None]:
+def _strays(stroke: Trajectory, motion: _Motion, part: slice) -> tuple[int | None, int | None]:
     """Last sample of an approach and first of a retract; None without them."""
     position = motion.position[part]
     tool = None if stroke.rotation is None else stroke.rotation[part][:, :, 2]

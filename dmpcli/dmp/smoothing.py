@@ -10,6 +10,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 
 # A sample moves when it is faster than this part of the stroke's peak speed ...
 REST_SPEED = 0.01
@@ -18,29 +19,6 @@ IDLE_MARGIN = 0.05
 # Recordings are evenly sampled when no step differs from the median by more than this part of it.
 _EVEN = 1e-4
 _ORDER = 4
-
-
-@dataclass(frozen=True)
-class SmoothedStroke:
-    """What the tool did: time from 0, positions and, where known, rotations.
-
-    Attributes
-    ----------
-    t : array, shape (T,)
-        s.
-    position : array, shape (T, 3)
-        mm, base frame.
-    rotation : array, shape (T, 3, 3), or None
-    """
-
-    t: Floats
-    position: Floats
-    rotation: Floats | None = None
-
-    @property
-    def duration(self) -> float:
-        """Seconds from the first to the last sample."""
-        return float(self.t[-1] - self.t[0])
 
 
 @dataclass(frozen=True)
@@ -57,7 +35,7 @@ class Signal:
     acceleration: Floats
 
 
-def evenly_sampled(stroke: SmoothedStroke) -> SmoothedStroke:
+def evenly_sampled(stroke: Trajectory) -> Trajectory:
     """Return the stroke on an even time grid from 0, at its median rate.
 
     Positions follow a cubic spline, rotations the shortest arc.
@@ -67,12 +45,12 @@ def evenly_sampled(stroke: SmoothedStroke) -> SmoothedStroke:
     step = float(np.median(steps))
     if is_even(t):
         # Spread rounding of the time stamps over the grid instead of leaving it in the derivatives.
-        return SmoothedStroke(np.linspace(0.0, t[-1], len(t)), stroke.position, stroke.rotation)
+        return Trajectory(np.linspace(0.0, t[-1], len(t)), stroke.position, stroke.rotation)
     from scipy.interpolate import CubicSpline
 
     even = np.linspace(0.0, t[-1], round(float(t[-1]) / step) + 1)
     rotation = None if stroke.rotation is None else rotations.interpolate(t, stroke.rotation, even)
-    return SmoothedStroke(even, CubicSpline(t, stroke.position)(even), rotation)
+    return Trajectory(even, CubicSpline(t, stroke.position)(even), rotation)
 
 
 def is_even(t: Floats) -> bool:

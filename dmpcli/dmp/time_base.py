@@ -10,8 +10,8 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.dmp import smoothing
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 
 # Stamps closer than this part of the usual step came in one burst, which spans at most as much.
 _BURST = 0.25
@@ -31,7 +31,7 @@ class TimeBase:
 
     Attributes
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         Even, from t = 0.
     origin : float
         Time of its first sample in the recording, s.
@@ -43,14 +43,14 @@ class TimeBase:
         Whether the steps were uneven, so that samples were interpolated.
     """
 
-    stroke: SmoothedStroke
+    stroke: Trajectory
     origin: float
     gaps: tuple[tuple[float, float], ...]
     merged: int
     resampled: bool
 
 
-def even(stroke: SmoothedStroke) -> TimeBase:
+def even(stroke: Trajectory) -> TimeBase:
     """Bring a recording to an even grid at its usual rate.
 
     Even recordings keep their samples to the last bit. Otherwise the samples of a burst become
@@ -58,7 +58,7 @@ def even(stroke: SmoothedStroke) -> TimeBase:
 
     Parameters
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
         At least two samples, times increasing.
 
     Returns
@@ -86,7 +86,7 @@ def even(stroke: SmoothedStroke) -> TimeBase:
     position = np.asarray(PchipInterpolator(t, merged.position, axis=0)(grid))
     R = merged.rotation
     rotation = None if R is None else rotations.interpolate(t, R, grid)
-    return TimeBase(SmoothedStroke(grid, position, rotation), origin, gaps, lost, True)
+    return TimeBase(Trajectory(grid, position, rotation), origin, gaps, lost, True)
 
 
 def _usual_step(steps: Floats) -> float:
@@ -102,7 +102,7 @@ def _usual_step(steps: Floats) -> float:
     return float(np.median(steps))
 
 
-def _merged(stroke: SmoothedStroke, usual: float) -> SmoothedStroke:
+def _merged(stroke: Trajectory, usual: float) -> Trajectory:
     """Average the samples of every burst."""
     starts = _bursts(stroke.t, usual)
     if len(starts) == len(stroke.t):
@@ -114,7 +114,7 @@ def _merged(stroke: SmoothedStroke, usual: float) -> SmoothedStroke:
     if stroke.rotation is not None:
         q = continuous_quaternions(stroke.rotation)
         rotation = rotations.from_quaternion(np.add.reduceat(q, starts, axis=0))
-    return SmoothedStroke(t, position, rotation)
+    return Trajectory(t, position, rotation)
 
 
 def _bursts(t: Floats, usual: float) -> Integers:

@@ -15,9 +15,9 @@ from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
 from dmpcli.records.columns import columns_of
 from dmpcli.records.file_io import Source
-from dmpcli.records.pairs import GOAL, OK, START
+from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
-from dmpcli.records.schemas import NORMAL, Column, Schema
+from dmpcli.records.schemas import NORMAL, OK, Column, Schema
 from dmpcli.records.trajectory_reader import unit_normals
 
 AGAIN = "the command that draws it goes on from the parts that are there"

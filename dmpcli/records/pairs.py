@@ -9,6 +9,7 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import tables
 from dmpcli.records.file_io import Source
+from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
@@ -17,7 +18,6 @@ START = ("x0", "y0", "z0")
 GOAL = ("xg", "yg", "zg")
 START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
-OK = "ok"
 
 FARTHEST = 1e6
 """Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""

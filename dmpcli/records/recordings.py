@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError, counted
 from dmpcli.records import (
     layouts,
@@ -29,6 +28,7 @@ from dmpcli.records.schemas import EULER_ANGLES
 from dmpcli.records.tables import HeadlessError, Table
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 
 SHORTEST = 10
 """Fewer samples than this are no stroke."""
@@ -55,7 +55,7 @@ class Recording:
 
     Attributes
     ----------
-    stroke : SmoothedStroke
+    stroke : Trajectory
     told : tuple of str
         How it was read, and what was assumed for that.
     doubts : tuple of str
@@ -64,7 +64,7 @@ class Recording:
         Whether it is a file of this program's, which tells its units and angles.
     """
 
-    stroke: SmoothedStroke
+    stroke: Trajectory
     told: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     ours: bool = False
@@ -138,7 +138,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     if record.is_ours(source):
         ours = record.decode(source, schemas.DEMONSTRATION)
         _partly_null(ours)
-        stroke = SmoothedStroke(ours.t, ours.position(), ours.rotation())
+        stroke = Trajectory(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
         return Recording(stroke, ours=True)
@@ -150,7 +150,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
-    stroke = SmoothedStroke(t, position, rotation)
+    stroke = Trajectory(t, position, rotation)
     if "sample_rate" not in given.said:
         stroke = _without_repeats(reading, stroke, name)
     _check_time(reading.table, stroke.t, name)
@@ -160,7 +160,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     return Recording(stroke, tuple(reading.told), tuple(reading.doubts))
 
 
-def stroke(source: Source, layout: Layout | None = None) -> SmoothedStroke:
+def stroke(source: Source, layout: Layout | None = None) -> Trajectory:
     """Read a demonstration, see `read`, without what there is to say of it."""
     return read(source, layout).stroke
 
@@ -332,7 +332,7 @@ def _rotation_columns(
     return None
 
 
-def _without_repeats(reading: _Reading, stroke: SmoothedStroke, name: str) -> SmoothedStroke:
+def _without_repeats(reading: _Reading, stroke: Trajectory, name: str) -> Trajectory:
     """Act on rows with one and the same stamp as the layout says."""
     how = reading.layout.repeated
     same = np.diff(stroke.t) == 0
@@ -354,10 +354,10 @@ def _without_repeats(reading: _Reading, stroke: SmoothedStroke, name: str) -> Sm
         R = rotations.from_quaternion(np.add.reduceat(q, starts, axis=0))
     elif R is not None:
         R = R[starts]
-    return SmoothedStroke(stroke.t[starts], position, R)
+    return Trajectory(stroke.t[starts], position, R)
 
 
-def _doubt_units(reading: _Reading, stroke: SmoothedStroke) -> None:
+def _doubt_units(reading: _Reading, stroke: Trajectory) -> None:
     """Doubt a stroke that no hand or arm draws; refuse one far too small for an unsaid unit."""
     found = plausibility.measures(stroke.t, stroke.position)
     length = reading.units.get("length", reading.layout.length)

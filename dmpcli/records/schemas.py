@@ -29,6 +29,10 @@ class Schema:
     columns: dict[str, Column] = field(default_factory=dict)
 
 
+OK = "ok"
+"""Status of a pair that has a trajectory."""
+
+
 POSITION = ("x", "y", "z")
 EULER_ANGLES = ("rx", "ry", "rz")
 POSE = POSITION + EULER_ANGLES

@@ -1,25 +1,25 @@
 """The mark of a skill beyond its tolerance: every later command repeats it with these words."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dmpcli.dmp.skill import Accuracy
-from dmpcli.records.skill import SkillFile
+if TYPE_CHECKING:
+    from dmpcli.dmp.skill import Accuracy
+    from dmpcli.records.skill import Reached, SkillFile
 
 FACT = "beyond_tolerance"
 
 
-def of_reached(reached: Accuracy | None) -> dict[str, float] | None:
+def of_reached(reached: "Accuracy | Reached | None") -> dict[str, float] | None:
     """Return tolerance, rms and largest, mm, where a skill is beyond its tolerance."""
     if reached is None or reached.within:
         return None
     return {"tolerance": reached.tolerance, "rms": reached.rms, "largest": reached.largest}
 
 
-def of_file(file: SkillFile) -> dict[str, float] | None:
+def of_file(file: "SkillFile") -> dict[str, float] | None:
     """Return the mark of a skill file."""
-    said = file.reached
-    return of_reached(None if said is None else Accuracy(**said.model_dump()))
+    return of_reached(file.reached)
 
 
 def of_facts(facts: Mapping[str, Any]) -> dict[str, float] | None:

@@ -11,8 +11,8 @@ from rich.table import Table
 from dmpcli.records import tolerance_mark
 from dmpcli.records.dataset import BatchFolder
 from dmpcli.records.learning_record import Lesson
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
+from dmpcli.records.schemas import OK
 from dmpcli.reporting import contact, paper_tables, ranking, stroke_measures, tables
 from dmpcli.reporting.batch import MeasuredBatch
 from dmpcli.reporting.ranking import Pupil

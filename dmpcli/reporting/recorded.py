@@ -18,6 +18,7 @@ from dmpcli.records import schemas
 from dmpcli.records.learning_record import Lesson
 from dmpcli.records.record import Provenance
 from dmpcli.reporting.stroke import LEAST, ReportedStroke, chart_axes
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces import plane
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.surface import Surface
@@ -44,7 +45,7 @@ class Recorded:
         Those that the report was given.
     """
 
-    recording: smoothing.SmoothedStroke
+    recording: Trajectory
     label: str
     name: str = ""
     sha256: str = ""

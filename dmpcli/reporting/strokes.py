@@ -12,8 +12,8 @@ from dmpcli.errors import InputError
 from dmpcli.records import learning_record as lessons
 from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.file_io import DASH
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
+from dmpcli.records.schemas import OK
 from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
 from dmpcli.reporting import tracking
 from dmpcli.reporting.stroke import LEAST, ReportedStroke, chart_axes

@@ -14,6 +14,9 @@ from dmpcli.spatial.rotations import skew
 METRE = 1000.0
 """Millimetres: a lever in mm times a force in N is METRE times a torque in N·m."""
 
+LEVER = 0.1
+"""m: a torque counts as much as the force that has it at this lever, about a tool's length."""
+
 
 @dataclass(frozen=True)
 class Tool:

@@ -11,8 +11,9 @@ from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
 from dmpcli.messages import progress, tell, warn
 from dmpcli.records import file_io, trajectory
-from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Form
+from dmpcli.records.schemas import OK
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import SLOW, SPLIT

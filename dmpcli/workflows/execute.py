@@ -18,10 +18,8 @@ from dmpcli.control import (
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.playback import Playback
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
 from dmpcli.control.stroke_file import StrokeSelection
-from dmpcli.control.watchdog import watched
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
@@ -30,7 +28,6 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
 from dmpcli.records import file_io, suffixes, tolerance_mark
-from dmpcli.records import tool as tool_files
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import RUN
@@ -176,7 +173,11 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
     if bench.note:
         tell(bench.note)
-    robot = watched(bench.robot) if realtime else bench.robot
+    robot = bench.robot
+    if realtime:
+        from dmpcli.control.watchdog import watched
+
+        robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
     try:
@@ -262,6 +263,8 @@ def check_output(request: ExecutionRequest, repeatable: bool) -> None:
 def _decoded(tool_file: Source | None, weighed: bool = True) -> Tool | None:
     if tool_file is None:
         return None
+    from dmpcli.records import tool as tool_files
+
     return tool_files.decode(tool_file) if weighed else tool_files.geometry(tool_file)
 
 
@@ -283,7 +286,11 @@ def _loop(
         check = None if tool_file is None else settings.tool_check
         touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
     watch = execution.watch(settings)
-    kind = Playback if isinstance(arm.servo, PlanPlayer) else ServoLoop
+    kind: type[PlanLoop] = ServoLoop
+    if isinstance(arm.servo, PlanPlayer):
+        from dmpcli.control.playback import Playback
+
+        kind = Playback
     return kind(plans[0], limits_of(settings), watch, arm, touch, keeper.hindrance, plans[1:])
 
 

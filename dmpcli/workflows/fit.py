@@ -6,7 +6,6 @@ from typing import Any
 from dmpcli.dmp.fit_result import Fit
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.skill import TaughtSurface
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError, about
 from dmpcli.messages import warn
 from dmpcli.records import learned_skill, skill
@@ -15,6 +14,7 @@ from dmpcli.records.layouts import Layout
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance
 from dmpcli.settings.fit import FitSettings
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows.fit_messages import cautions
 from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -42,7 +42,7 @@ def check_said(said: Mapping[str, Any], on_surface: bool) -> None:
 
 def learn(
     sources: Sequence[Source],
-    strokes: Sequence[SmoothedStroke],
+    strokes: Sequence[Trajectory],
     settings: FitSettings,
     form: Layout | None = None,
     on: SurfaceInput | None = None,
@@ -53,7 +53,7 @@ def learn(
     ----------
     sources : sequence of Source
         The recordings' files.
-    strokes : sequence of SmoothedStroke
+    strokes : sequence of Trajectory
         What was read of them.
     settings : FitSettings
     form : Layout, optional

@@ -28,7 +28,8 @@ def one_pair(
     import numpy as np
 
     from dmpcli.dmp.rollout import Pairs
-    from dmpcli.records.pairs import LARGEST_ANGLE, OK, PairTable
+    from dmpcli.records.pairs import LARGEST_ANGLE, PairTable
+    from dmpcli.records.schemas import OK
     from dmpcli.spatial import rotations
     from dmpcli.workflows.pose_hints import warn_of_angles
     from dmpcli.workflows.ranges import within

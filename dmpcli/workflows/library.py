@@ -17,7 +17,8 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, learned_skill, record, recordings, schemas
 from dmpcli.records.learned_skill import LearnedSkill
-from dmpcli.records.pairs import FARTHEST, OK, PairTable
+from dmpcli.records.pairs import FARTHEST, PairTable
+from dmpcli.records.schemas import OK
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.fit import FitSettings
 from dmpcli.settings.generalize import GeneralizeSettings

@@ -1,13 +1,13 @@
 """How a recording was read, told by all who take any."""
 
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.messages import tell, warn
 from dmpcli.records import recordings
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
+from dmpcli.spatial.trajectory import Trajectory
 
 
-def recording(source: Source, layout: Layout | None) -> SmoothedStroke:
+def recording(source: Source, layout: Layout | None) -> Trajectory:
     """Read a recording, and say how it was read and what is doubtful about it."""
     found = recordings.read(source, layout)
     if found.ours and layout is not None:

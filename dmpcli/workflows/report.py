@@ -44,7 +44,7 @@ _WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
 
 
 @dataclass(frozen=True)
-class Report:
+class StrokeReport:
     """What was measured, as plain values.
 
     Attributes
@@ -90,7 +90,7 @@ def report(
     layout: Layout | None,
     read: SurfaceInput | None,
     output: Path | None,
-) -> Report:
+) -> StrokeReport:
     """Compare strokes, write the report's folder where one is named, and tell what is doubtful.
 
     Parameters
@@ -133,7 +133,7 @@ def report(
             written = _write(output, made, parts, ground)
     if output is not None:
         tell(f"{output}: wrote {', '.join(written)}")
-    return Report(made)
+    return StrokeReport(made)
 
 
 def _part(

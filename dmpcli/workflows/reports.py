@@ -17,7 +17,7 @@ from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import inspect as inspecting
 from dmpcli.workflows import report as reporting
 from dmpcli.workflows import surface_input, values
-from dmpcli.workflows.report import Report
+from dmpcli.workflows.report import StrokeReport
 from dmpcli.workflows.values import TrajectoryBatch
 
 
@@ -27,7 +27,7 @@ def report(
     output: str | Path | None = None,
     names: Sequence[str] | None = None,
     **said: Any,
-) -> Report:
+) -> StrokeReport:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines.
 
     Parameters

@@ -124,10 +124,10 @@ class RunOutput:
         InputError
             Another run has a journal of this name, or one that did not end has left it.
         """
-        from dmpcli.records import journal
-
         if self.output is None or not self._realtime:
             return
+        from dmpcli.records import journal
+
         path = journal.beside(self.output)
         if path is not None:
             journal.refuse_taken(path)

@@ -12,8 +12,8 @@ from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import RefusedError, about, counted
 from dmpcli.messages import tell, warn
 from dmpcli.records import trajectory
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Record
+from dmpcli.records.schemas import OK
 from dmpcli.surfaces.surface import LEAVES
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import pieces, warn_of_speed

@@ -19,8 +19,8 @@ from dmpcli.records import file_io, record, recordings, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.learned_skill import LearnedSkill
-from dmpcli.records.pairs import OK
 from dmpcli.records.record import Provenance, Record
+from dmpcli.records.schemas import OK
 from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke

@@ -13,8 +13,9 @@ from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import RefusedError
 from dmpcli.records import file_io, record
-from dmpcli.records.pairs import OK, PairTable
+from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Form, Provenance
+from dmpcli.records.schemas import OK
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.surface import Status
 from tests.dmp.strokes import paper_stroke

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from dmpcli import cli
 from dmpcli.dmp import reference_paths
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.records import file_io, record
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from tests.commands.test_generalize import run, write_skill
 from tests.dmp.strokes import paper_stroke
 
@@ -43,8 +43,8 @@ def shop(tmp_path_factory):
     t = np.linspace(0, 8, 401)
     angles = np.tile([np.pi, 0.0, 0.0], (401, 1))
     x = reference_paths.sine(np.zeros(3), np.array([120.0, 0, 0]), 30.0, t, 8.0)
-    write_skill(folder / "s.json", SmoothedStroke(t, x, rotations.from_euler(angles)))
-    write_skill(folder / "bare.json", SmoothedStroke(t, x))
+    write_skill(folder / "s.json", Trajectory(t, x, rotations.from_euler(angles)))
+    write_skill(folder / "bare.json", Trajectory(t, x))
     write_skill(folder / "original.json", paper_stroke(), model="original")
     holed_plate().export(folder / "plate.ply")
     trimesh.creation.box((300, 300, 10)).apply_translation([0, 0, -5]).export(folder / "box.stl")

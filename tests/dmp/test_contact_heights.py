@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dmpcli.dmp.contact_heights import ContactHeights, contact_heights, end_heights
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.plane import Plane
 from tests import cases
 
@@ -21,7 +21,7 @@ def taught(height):
     """Skill of the wave at heights over the plate, a number or one for each sample."""
     position = cases.wave(cases.U6)
     position[:, 2] = height
-    return fit([SmoothedStroke(cases.T6, position)], FitOptions(), PLATE).skill
+    return fit([Trajectory(cases.T6, position)], FitOptions(), PLATE).skill
 
 
 def bump(height, begin=2.4, end=3.6):

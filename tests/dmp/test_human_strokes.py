@@ -11,8 +11,8 @@ from dmpcli.dmp.generalization import draw
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.deviation import nearest_rms
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
 
@@ -93,7 +93,7 @@ def test_strokes_that_end_where_they_began_keep_their_shape_and_reach_their_goal
     """Each stroke and its way back: closed, and beyond its own ends."""
     for stroke in (strokes(shape)[i] for i in (3,)):
         back = stroke.position[-2::-1]
-        there_and_back = SmoothedStroke(
+        there_and_back = Trajectory(
             np.linspace(0.0, 2.0 * stroke.duration, 2 * len(stroke.t) - 1),
             np.concatenate([stroke.position, back]),
         )

@@ -11,7 +11,7 @@ from dmpcli.dmp.generalization import draw
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
-from dmpcli.dmp.smoothing import SmoothedStroke
+from dmpcli.spatial.trajectory import Trajectory
 from tests import cases
 from tests.dmp.strokes import circle, paper_stroke
 from tests.human_strokes import strokes as human_strokes
@@ -36,7 +36,7 @@ def wandering(seed, samples=301, duration=4.0):
     for k in range(1, 5):
         size = rng.normal(0.0, 12.0 / k, 3) * [1.0, 1.0, 0.3]
         position += np.outer(np.sin(np.pi * k * r + rng.uniform(0.0, 6.0)), size)
-    return SmoothedStroke(t, position)
+    return Trajectory(t, position)
 
 
 # Ends.
@@ -132,7 +132,7 @@ def from_table(table):
     rotation = None
     if table.shape[1] == 8:
         rotation = Rotation.from_quat(table[:, 4:]).as_matrix()
-    return SmoothedStroke(table[:, 0], table[:, 1:4], rotation)
+    return Trajectory(table[:, 0], table[:, 1:4], rotation)
 
 
 @pytest.mark.slow
@@ -140,7 +140,7 @@ def from_table(table):
 @pytest.mark.parametrize("regression", ["lwr", "ridge"])
 def test_moving_a_recording_with_its_tool_moves_the_drawn_stroke(name, regression):
     here = STROKES[name]()
-    there = SmoothedStroke(here.t, here.position @ Q.T + SHIFT, Q @ here.rotation)
+    there = Trajectory(here.t, here.position @ Q.T + SHIFT, Q @ here.rotation)
     a, b = (fit([s], FitOptions(regression=regression)).skill for s in (here, there))
     start = here.position[0] + [3.0, -8.0, 0.0]
     goal = start + 1.3 * (here.position[-1] - here.position[0])
@@ -154,9 +154,9 @@ def test_moving_a_recording_with_its_tool_moves_the_drawn_stroke(name, regressio
 @pytest.mark.parametrize("name", ["paper", "wandering", "lifted"])
 def test_mirroring_a_recording_mirrors_the_drawn_stroke(name):
     here = STROKES[name]()
-    there = SmoothedStroke(here.t, here.position @ MIRROR)
+    there = Trajectory(here.t, here.position @ MIRROR)
     a, b = (
-        fit([SmoothedStroke(here.t, here.position)], FitOptions()).skill,
+        fit([Trajectory(here.t, here.position)], FitOptions()).skill,
         fit([there], FitOptions()).skill,
     )
     start = here.position[0] + [3.0, -8.0, 0.0]
@@ -180,7 +180,7 @@ def test_the_order_of_demonstrations_changes_nothing(kind):
             turn = Rotation.from_euler("z", rng.normal(0.0, 0.03)).as_matrix()
             position = whole.position @ turn.T + rng.normal(0.0, 0.1, whole.position.shape)
             strokes.append(
-                SmoothedStroke(whole.t, position + rng.normal(0.0, 2.0, 3), turn @ whole.rotation)
+                Trajectory(whole.t, position + rng.normal(0.0, 2.0, 3), turn @ whole.rotation)
             )
     forward = fit(strokes, FitOptions()).skill
     start, goal = np.array([10.0, 20.0, 5.0]), np.array([-90.0, 60.0, 5.0])

@@ -5,9 +5,9 @@ import pytest
 
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from tests.dmp.strokes import HEIGHT, circle, paper_stroke
 from tests.minimum_jerk import minimum_jerk
 
@@ -44,7 +44,7 @@ def test_in_chart_coordinates_the_goal_lies_on_the_u_axis():
 def test_fit_does_not_depend_on_where_and_how_the_stroke_lies():
     here = paper_stroke(turning=True)
     Q, shift = rotations.from_euler(np.array([0.4, -0.3, 1.1])), np.array([10.0, -900.0, 300.0])
-    there = SmoothedStroke(here.t, here.position @ Q.T + shift, Q @ here.rotation)
+    there = Trajectory(here.t, here.position @ Q.T + shift, Q @ here.rotation)
     a, b = fit([here], FitOptions()).skill, fit([there], FitOptions()).skill
     # Straight-down ties are broken by base axes, so the frames agree up to the motion itself.
     np.testing.assert_allclose(b.frame.axes, Q @ a.frame.axes, atol=1e-9)
@@ -72,7 +72,7 @@ def test_a_closed_stroke_fits_without_blow_up(model, regression):
 def test_a_stroke_that_begins_in_motion_keeps_its_initial_velocity():
     t = np.linspace(0.0, 2.0, 401)
     position = np.stack([40.0 * t, 10.0 * np.sin(3.0 * t), 0 * t], axis=1)
-    result = fit([SmoothedStroke(t, position)], FitOptions(regression="ridge"))
+    result = fit([Trajectory(t, position)], FitOptions(regression="ridge"))
     speed = np.linalg.norm(result.skill.initial_velocity[:3]) / result.skill.spring.tau
     assert speed == pytest.approx(50.0, rel=0.02)
     assert result.reproductions[0].rms < 0.02
@@ -85,7 +85,7 @@ def test_a_straight_line_fits_and_has_no_wave():
     r = t / 5
     s = minimum_jerk(r)
     position = np.array([1.0, 2.0, 3.0]) + np.outer(80 * s, [0.6, 0.0, 0.8])
-    result = fit([SmoothedStroke(t, position)], FitOptions())
+    result = fit([Trajectory(t, position)], FitOptions())
     assert result.reproductions[0].rms < 0.05
     np.testing.assert_allclose(result.reproductions[0].reproduced[:, 1:], 0.0, atol=1e-9)
 
@@ -114,7 +114,7 @@ def test_idle_ends_are_trimmed_and_a_soft_start_is_kept():
         ]
     )
     t = np.arange(len(position)) * 0.02
-    result = fit([SmoothedStroke(t, position)], FitOptions())
+    result = fit([Trajectory(t, position)], FitOptions())
     before, after = result.prepared[0].trimmed
     assert 2.4 < before < 3.1
     assert 2.4 < after < 3.1
@@ -125,8 +125,8 @@ def test_idle_ends_are_trimmed_and_a_soft_start_is_kept():
 
 def test_several_demonstrations_of_differing_length_and_duration_share_one_skill():
     a = paper_stroke()
-    longer = SmoothedStroke(a.t[::2] * 1.4, a.position[::2] * [1.2, 1.0, 1.0])
-    plain = SmoothedStroke(a.t, a.position)
+    longer = Trajectory(a.t[::2] * 1.4, a.position[::2] * [1.2, 1.0, 1.0])
+    plain = Trajectory(a.t, a.position)
     result = fit([plain, longer], FitOptions())
     assert len(result.reproductions) == 2
     lengths = [p.frame.length for p in result.prepared]
@@ -151,7 +151,7 @@ def test_two_equal_demonstrations_give_the_skill_of_one():
 def test_several_demonstrations_of_the_original_model_reproduce_each(scale):
     a = paper_stroke()
     result = fit(
-        [a, SmoothedStroke(a.t, a.position + [5.0, 3.0, 0.0], a.rotation)],
+        [a, Trajectory(a.t, a.position + [5.0, 3.0, 0.0], a.rotation)],
         FitOptions(model="original", forcing_scale=scale),
     )
     assert max(r.rms for r in result.reproductions) < 0.2
@@ -159,8 +159,8 @@ def test_several_demonstrations_of_the_original_model_reproduce_each(scale):
 
 def test_unequal_demonstrations_are_refused_by_what_differs():
     with pytest.raises(InputError, match=r"demonstration 2 is closed, the first is open"):
-        fit([SmoothedStroke(paper_stroke().t, paper_stroke().position), circle()], FitOptions())
-    bare = SmoothedStroke(paper_stroke().t, paper_stroke().position)
+        fit([Trajectory(paper_stroke().t, paper_stroke().position), circle()], FitOptions())
+    bare = Trajectory(paper_stroke().t, paper_stroke().position)
     with pytest.raises(InputError, match="only one has an orientation"):
         fit([paper_stroke(), bare], FitOptions())
 
@@ -168,7 +168,7 @@ def test_unequal_demonstrations_are_refused_by_what_differs():
 def test_a_tool_that_does_not_move_is_refused():
     t = np.linspace(0, 1, 50)
     with pytest.raises(InputError, match="does not move"):
-        fit([SmoothedStroke(t, np.ones((50, 3)))], FitOptions())
+        fit([Trajectory(t, np.ones((50, 3)))], FitOptions())
 
 
 def test_unevenly_sampled_recordings_give_nearly_the_same_skill():
@@ -178,8 +178,8 @@ def test_unevenly_sampled_recordings_give_nearly_the_same_skill():
     from scipy.interpolate import CubicSpline
 
     position = CubicSpline(even.t, even.position)(t)
-    a = fit([SmoothedStroke(even.t, even.position)], FitOptions()).reproductions[0]
-    b = fit([SmoothedStroke(t, position)], FitOptions()).reproductions[0]
+    a = fit([Trajectory(even.t, even.position)], FitOptions()).reproductions[0]
+    b = fit([Trajectory(t, position)], FitOptions()).reproductions[0]
     assert abs(height(a) - height(b)) < 0.01
 
 
@@ -199,7 +199,7 @@ def test_the_first_orientation_is_smoothed_too_where_the_recording_begins_before
     errors, raw = [], []
     for seed in range(8):
         noise = rotations.exp(0.02 * np.random.default_rng(seed).normal(size=(len(t), 3)))
-        noisy = SmoothedStroke(t, position, noise @ stroke.rotation[0])
+        noisy = Trajectory(t, position, noise @ stroke.rotation[0])
         prepared = fit([noisy], FitOptions()).prepared[0]
         first = prepared.frame.rotation
         errors.append(np.linalg.norm(rotations.log(first @ stroke.rotation[0].T)))

@@ -15,10 +15,10 @@ from dmpcli.dmp.generalization import charts_of, draw
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs, curves, poses
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.dmp.time_scaling import timing
 from dmpcli.metrics.paper_values import GENERALIZATION
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.plane import Plane
 from tests.dmp.strokes import GOAL, HEIGHT, START, circle, paper_stroke
 
@@ -210,7 +210,7 @@ def test_a_new_duration_scales_tau_and_leaves_the_path(skill):
 
 def test_easing_keeps_path_and_ends_and_begins_and_ends_at_rest():
     t = np.linspace(0.0, 2.0, 401)
-    moving = SmoothedStroke(t, np.stack([40.0 * t, 10.0 * np.sin(3.0 * t), 0 * t], axis=1))
+    moving = Trajectory(t, np.stack([40.0 * t, 10.0 * np.sin(3.0 * t), 0 * t], axis=1))
     skill = fit([moving], FitOptions(regression="ridge")).skill
     plain = draw_one(skill, [0, 0, 0], [100, 0, 0], rate=500.0)
     eased = draw_one(skill, [0, 0, 0], [100, 0, 0], rate=500.0, ease_in=0.4, ease_out=0.6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dmpcli.dmp import noise, segmentation, smoothing
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from tests import human_strokes
 from tests.dmp.recordings import (
     corners,
@@ -23,7 +23,7 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 
 def segments(t, points, rotation=None):
     R = None if rotation is None else np.tile(rotation, (len(t), 1, 1))
-    return segmentation.segment(SmoothedStroke(t, points, R), noise.estimate(points))
+    return segmentation.segment(Trajectory(t, points, R), noise.estimate(points))
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.02, 0.1, 0.3])
@@ -67,7 +67,7 @@ def test_pauses_that_are_cut_out_leave_no_jump():
     _, points = six_seconds()
     still = np.r_[points[:300], np.tile(points[300], (500, 1)), points[300:]]
     R = rotations.exp(np.column_stack([0.01 * still[:, 0], 0 * still[:, 1:]]))
-    stroke = SmoothedStroke(np.arange(len(still)) / 100, still, R)
+    stroke = Trajectory(np.arange(len(still)) / 100, still, R)
     found = segmentation.segment(stroke, noise.estimate(still))
     closed = segmentation.cut(stroke, pauses=found.pauses)
     assert closed.duration == pytest.approx(6.0, abs=0.2)
@@ -80,7 +80,7 @@ def test_pauses_that_are_cut_out_leave_no_jump():
 
 def test_a_cut_keeps_the_samples_that_its_times_name():
     t, points = six_seconds()
-    part = segmentation.cut(SmoothedStroke(t, points), 1.0, 2.0)
+    part = segmentation.cut(Trajectory(t, points), 1.0, 2.0)
     assert len(part.t) == 101
     np.testing.assert_array_equal(part.position, points[100:201])
     assert part.t[0] == 0.0

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.preprocessing import preprocess
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.dmp.taught_strokes import mean_frame, taught_strokes
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
 from tests import cases
@@ -28,7 +28,7 @@ def on_drum(uv, w=0.0):
 
 
 def seen(position, rotation=None, t=cases.T6):
-    return preprocess(SmoothedStroke(t, position, rotation))
+    return preprocess(Trajectory(t, position, rotation))
 
 
 @pytest.mark.parametrize("w", [0.0, 5.0, -2.0])
@@ -61,7 +61,7 @@ def test_the_chart_of_a_named_plane_is_rigid():
     Q = Rotation.from_euler("xyz", [0.3, -0.2, 1.0]).as_matrix()
     plane = Plane(stroke.position[0] + [0, 0, -3.0], np.array([0.0, 0.0, 1.0]))
     turned = Plane(Q @ plane.point, Q @ plane.normal)
-    moved = SmoothedStroke(stroke.t, stroke.position @ Q.T, Q @ stroke.rotation)
+    moved = Trajectory(stroke.t, stroke.position @ Q.T, Q @ stroke.rotation)
     [a], _, _ = taught_strokes([preprocess(stroke)], FitOptions(), plane)
     [b], _, _ = taught_strokes([preprocess(moved)], FitOptions(), turned)
     t = np.linspace(0.0, 10.0, 50)
@@ -87,9 +87,9 @@ def test_what_lies_nowhere_near_the_surface_is_refused_with_what_to_check():
 
 def test_closedness_is_that_of_the_mean_gap():
     whole = circle()
-    nearly = SmoothedStroke(whole.t[:-60], whole.position[:-60])
+    nearly = Trajectory(whole.t[:-60], whole.position[:-60])
     open_alone = taught_strokes([preprocess(nearly, trim=False)], FitOptions(), None)[2]
-    both = [preprocess(SmoothedStroke(whole.t, whole.position)), preprocess(nearly, trim=False)]
+    both = [preprocess(Trajectory(whole.t, whole.position)), preprocess(nearly, trim=False)]
     gap = np.linalg.norm(nearly.position[-1] - nearly.position[0])
     assert gap > 0.0
     assert taught_strokes(both, FitOptions(), None)[2]
@@ -99,7 +99,7 @@ def test_closedness_is_that_of_the_mean_gap():
 
 def test_a_stroke_without_a_gap_among_open_ones_is_refused():
     ring, line = circle(), cases.wave(cases.U6, 900.0)
-    both = [preprocess(SmoothedStroke(ring.t, ring.position)), seen(line), seen(line)]
+    both = [preprocess(Trajectory(ring.t, ring.position)), seen(line), seen(line)]
     with pytest.raises(InputError, match="demonstration 1 is closed, the others are open"):
         taught_strokes(both, FitOptions(), None)
 

@@ -28,12 +28,11 @@ def missed(position, rotation, q):
 def searched(position, rotation, starts=24):
     """How near scipy brings the flange to a pose: mm, and turns as on a lever of 100 mm."""
     rng = np.random.default_rng(11)
-    found = (
-        least_squares(
-            lambda q: missed(position, rotation, q), rng.uniform(-np.pi, np.pi, 6), xtol=1e-12
-        )
-        for _ in range(starts)
-    )
+
+    def off(q):
+        return missed(position, rotation, q)
+
+    found = (least_squares(off, rng.uniform(-np.pi, np.pi, 6), xtol=1e-12) for _ in range(starts))
     return min(np.sqrt(2 * fit.cost) for fit in found)
 
 

@@ -187,7 +187,8 @@ def test_reach_agrees_with_a_search_near_the_boundary():
         azimuth, height = rng.uniform(0, 2 * np.pi), rng.uniform(-200, 500)
         at = np.array([820 * np.cos(azimuth), 820 * np.sin(azimuth), height])
         at[:2] *= rng.uniform(0.9, 1.1)
-        found = path.follow(EC66, *pen(at[None]), 1.0)
+        position, rotation = pen(at[None])
+        found = path.follow(EC66, position, rotation, 1.0)
         reached = bool(found.missing.passed[0])
 
         def missed(q, at=at):

@@ -122,7 +122,8 @@ def edited(row, column, text, name="log.csv"):
             csv(header="t x y z rx ry rz", values=np.column_stack([T, XYZ, 180 + 0 * XYZ])),
             "line 2: an angle of 180 rad; check the unit of angle",
         ),
-        (csv(values=np.column_stack([T * 1e300, XYZ])), "check the unit of time"),
+        (csv(values=np.column_stack([T * 1e25, XYZ])), "check the unit of time"),
+        (csv(values=np.column_stack([T * 1e300, XYZ])), r"column 't', line 3: .* is beyond 1e\+30"),
         (csv(header="t x y z rx", values=np.column_stack([T, XYZ, T])), "'ry' is missing"),
     ],
 )

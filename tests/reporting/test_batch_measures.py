@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dmpcli.dmp.smoothing import SmoothedStroke as Recording
+from dmpcli.dmp.smoothing import Trajectory as Recording
 from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.reporting import stroke_measures
 from dmpcli.reporting.batch import histogram, measure

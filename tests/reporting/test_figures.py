@@ -8,12 +8,12 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from dmpcli.dmp import smoothing
 from dmpcli.reporting import drawing, figures
 from dmpcli.reporting.drawing import curve_of
 from dmpcli.reporting.plane_curves import plane_curves
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.reporting.time_curves import time_curves
+from dmpcli.spatial.trajectory import Trajectory
 from tests.reporting.example_files import (
     GOAL,
     NEW_GOAL,
@@ -29,9 +29,7 @@ from tests.reporting.example_files import (
 
 def taught(**more):
     record = demonstration(**more)
-    return demonstrated(
-        smoothing.SmoothedStroke(record.t, record.position()), "demo", None, record.provenance
-    )
+    return demonstrated(Trajectory(record.t, record.position()), "demo", None, record.provenance)
 
 
 def planned(start, goal, height, **facts):

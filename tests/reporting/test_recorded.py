@@ -7,13 +7,13 @@ from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.paper_preprocessing import prepare
 from dmpcli.dmp.skill import TaughtSurface
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.errors import InputError
 from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.records.learning_record import PAPER, Lesson
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke_measures import row_of
 from dmpcli.reporting.strokes import strokes_of
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.sphere import Sphere
 from tests.minimum_jerk import minimum_jerk
 from tests.reporting.example_files import GOAL, START, trajectory, wave
@@ -25,7 +25,7 @@ SPHERE = Sphere(np.array([0.0, 0.0, -RADIUS]), RADIUS)
 def recording(path=None, dt=0.02, noise=0.0):
     path = wave() if path is None else path
     path = path + noise * np.random.default_rng(11).standard_normal(path.shape)
-    return SmoothedStroke(np.arange(len(path)) * dt, path, None)
+    return Trajectory(np.arange(len(path)) * dt, path, None)
 
 
 def on_sphere(height=30.0, n=801):

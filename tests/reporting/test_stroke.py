@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from dmpcli.dmp import smoothing
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.reporting.strokes import labels_of, pairs_of, strokes_of
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
 from tests.reporting.example_files import (
     GOAL,
     NEW_GOAL,
@@ -24,7 +24,7 @@ from tests.reporting.example_files import (
 
 
 def shown(record, normal=None):
-    recording = smoothing.SmoothedStroke(record.t, record.position())
+    recording = Trajectory(record.t, record.position())
     return demonstrated(recording, "demo", normal, record.provenance)
 
 

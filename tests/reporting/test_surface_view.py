@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmpcli.dmp import smoothing
 from dmpcli.records.learning_record import Lesson
 from dmpcli.reporting import document, figures
 from dmpcli.reporting.report_surface import ReportSurface, placed
@@ -13,6 +12,7 @@ from dmpcli.reporting.stroke_measures import row_of
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.reporting.surface_picture import MOST_FACES, picture
 from dmpcli.reporting.surface_view import surface_view
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
 from tests.reporting.example_files import (
@@ -38,7 +38,7 @@ def ground():
 def taught(path=None, lesson=None):
     record = demonstration(path)
     return demonstrated(
-        smoothing.SmoothedStroke(record.t, record.position()),
+        Trajectory(record.t, record.position()),
         "demo",
         None,
         record.provenance,

@@ -6,7 +6,7 @@ import math
 import tomllib
 from dataclasses import MISSING
 from importlib import resources
-from typing import Annotated, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import pytest
 import typer
@@ -31,7 +31,7 @@ from dmpcli.settings.record import RecordSettings
 from dmpcli.settings.recording import RecordingOptions
 from dmpcli.surfaces import registration
 
-GROUP = typer.main.get_command(cli.app)
+GROUP: Any = typer.main.get_command(cli.app)
 SECTIONS = [CalibrateSettings, ExecuteSettings, FitSettings, GeneralizeSettings, RecordSettings]
 
 

@@ -10,9 +10,9 @@ from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.skill import TaughtSurface
-from dmpcli.dmp.smoothing import SmoothedStroke
 from dmpcli.metrics.deviation import nearest_distance
 from dmpcli.metrics.wave_height import wave_heights
+from dmpcli.spatial.trajectory import Trajectory
 from tests.surfaces import cases
 
 DURATION = 6.0
@@ -59,7 +59,7 @@ class Carried:
 def taught(name, mesh, case, i, choices):
     """Skill of the case's i-th stroke, taught on a mesh."""
     t = np.linspace(0.0, DURATION, case.position.shape[1])
-    stroke = SmoothedStroke(t, case.position[i], tool(case.axes[i]))
+    stroke = Trajectory(t, case.position[i], tool(case.axes[i]))
     return fit([stroke], choices, mesh, TaughtSurface("mesh", {})).skill
 
 

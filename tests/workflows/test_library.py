@@ -69,7 +69,7 @@ def test_a_trajectory_has_the_bytes_that_generalize_writes(tmp_path, skill, surf
     words, on = [], None
     if surface is not None:
         on = dmpcli.read_surface(surface)
-        ends = tuple(tuple(p) for p in on.closest(np.array(ends)).position.tolist())
+        ends = tuple(on.closest(np.array(ends)).position.tolist())
         words = ["--surface", surface]
     dmpcli.write(skill, tmp_path / "s.json")
     words += ["--start", *ends[0], "--goal", *ends[1], "--orientation", "surface"]
