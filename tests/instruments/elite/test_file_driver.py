@@ -27,7 +27,7 @@ def test_a_plan_is_sent_with_time_stamps_from_zero_and_checked_before_it_may_run
         "stop_push_pos",
         "check_trajectory",
     ]
-    head, *points = [params for _, params in robot.asked[:6]]
+    head, *points = [params for _, params in robot.asked[1:7]]
     assert (head["path_lenth"], head["pos_type"], head["ret_flag"]) == (5, 0, 1)
     assert head["ref_frame"] == [0.0] * 6
     assert [point["timestamp"] for point in points] == [0.0, 0.02, 0.04, 0.06, 0.08]
