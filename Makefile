@@ -9,6 +9,7 @@
 #   make lock        the lock files, from pyproject.toml
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
+#   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make mutations   damaged and crafted inputs for every reader: what is not refused
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
@@ -36,8 +37,8 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers soak mutations cluster-demo \
-    samples pictures schemas clean FORCE
+.PHONY: help demo reproduce test test-quick test-lowest lint lock dist bench peers faults soak mutations \
+    cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -110,6 +111,12 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
+
+# One seed replays one failure: python -m tests.faults --seed N.
+SEEDS ?= 10000
+
+faults: $(VENV)/installed
+	$(BIN)/python -m tests.faults --seeds $(SEEDS)
 
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak

@@ -14,6 +14,7 @@ from dmpcli.settings.options import with_options
 
 if TYPE_CHECKING:
     from dmpcli.admittance.payload_identification import Identification
+    from dmpcli.control.ownership import ArmLock
     from dmpcli.control.signals import Interruption
     from dmpcli.control.workcell import Workcell
     from dmpcli.instruments.protocols import Clock, SensorInfo
@@ -136,7 +137,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     from dmpcli.calibration import result
     from dmpcli.calibration.by_hand import Keyboard
     from dmpcli.calibration.tour import Interrupted
-    from dmpcli.control import guards, workcell
+    from dmpcli.control import guards, ownership, workcell
     from dmpcli.control.signals import Interruption
     from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
     from dmpcli.messages import tell, warn
@@ -160,6 +161,8 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         guards.check_streams(bench.robot)
     if bench.note:
         tell(bench.note)
+    lock = ownership.ArmLock(addresses[0], moves=keyboard is None)
+    lock.take()
     taken: list[StaticPose] = []
     info: SensorInfo | None = None
     failed = True
@@ -169,7 +172,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
     try:
         with Interruption() as interruption:
             info = bench.sensor.open()
-            _take(bench, info, clock, settings, interruption, keyboard, taken)
+            _take(bench, info, clock, settings, interruption, keyboard, taken, lock)
         failed = False
     except Interrupted as stop:
         warn(str(stop))
@@ -179,7 +182,7 @@ def _measure(settings: "CalibrateSettings", request: CalibrationRequest) -> None
         raise
     finally:
         # What was measured is kept, whatever ended it.
-        closing = guards.leave(bench.robot.close, bench.sensor.close)
+        closing = guards.leave(bench.robot.close, bench.sensor.close, lock.release)
         if taken and info is not None:
             try:
                 name = _poses_name(request, failed or closing is not None)
@@ -209,6 +212,7 @@ def _take(
     interruption: "Interruption",
     keyboard: Any,
     taken: "list[StaticPose]",
+    lock: "ArmLock",
 ) -> None:
     """Fill `taken`, by the arm's own motion or as a person leads it."""
     from dmpcli.calibration.resting import Watcher
@@ -222,6 +226,7 @@ def _take(
     rate = min(settings.sensor_rate, info.rate)
     robot = bench.robot if bench.lock_step else watched(bench.robot)
     arm = ReadyArm(robot, robot.open(), clock)
+    lock.require_rest(robot, clock)
     bench.sensor.start(rate)
     sensing = Sensing(bench.sensor, info, rate, settings.period, clock)
     sensing.first(settings.settle)

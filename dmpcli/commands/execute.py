@@ -30,7 +30,7 @@ def command(
     tool: Annotated[Path | None, typer.Option(metavar="FILE", help="Tool file.")] = None,
     robot_model: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66."),
+        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66, ur5e."),
     ] = None,
     coupling: Annotated[
         Literal["force"] | None,
@@ -49,6 +49,13 @@ def command(
     given: Given,
     realtime: Realtime = False,
     allow_mixed: AllowMixed = False,
+    allow_file_mode: Annotated[
+        bool,
+        typer.Option(
+            "--allow-file-mode",
+            help="Let the controller play the plan, though the arm draws on if the link is lost.",
+        ),
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -72,6 +79,7 @@ def command(
         allow_mixed,
         force,
         dry_run,
+        allow_file_mode,
     )
     run = execute(settings, request).run
     if run is not None and run.signal is not None:

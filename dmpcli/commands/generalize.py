@@ -63,7 +63,9 @@ def command(
     given: Given,
     robot_model: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66."),
+        typer.Option(
+            metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66, ur5e."
+        ),
     ] = None,
     tool: Annotated[
         Path | None,

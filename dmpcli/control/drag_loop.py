@@ -11,7 +11,7 @@ import numpy as np
 from dmpcli.admittance.compensation import Compensation, LowPass, dead_band
 from dmpcli.admittance.model import DragState, brake, move
 from dmpcli.arrays import Floats
-from dmpcli.control import guards
+from dmpcli.control import guards, ownership
 from dmpcli.control.cycle import (
     ControlLoop,
     Cycle,
@@ -105,6 +105,9 @@ class Recorder(ControlLoop):
         Read once a cycle; what it returns brakes the tool and is what the recording ends with.
     remark : callable, optional
         Told, before anything moves, what is odd about the instruments.
+    shared : bool
+        Whether others could move the arm: then it must stand still when it is taken, unless a hand
+        leads it.
 
     Attributes
     ----------
@@ -128,6 +131,7 @@ class Recorder(ControlLoop):
         lead_in: float = 0.0,
         hindrance: Callable[[], DmpError | None] = lambda: None,
         remark: Callable[[str], None] = lambda _: None,
+        shared: bool = False,
     ) -> None:
         watch = StopLimits(
             settings.following_error,
@@ -141,7 +145,7 @@ class Recorder(ControlLoop):
         self._tool, self._settings = tool, settings
         self._longest, self._asked_to_end, self._tell_begin = longest, asked_to_end, begin
         self._interruption = interruption or Interruption()
-        self._lead_in, self._remark = lead_in, remark
+        self._lead_in, self._remark, self._shared = lead_in, remark, shared
         self._law, self._bounds = settings.law, settings.bounds
         self._ended = ""
         self.log = DemonstrationLog(referred=led)
@@ -168,6 +172,8 @@ class Recorder(ControlLoop):
         try:
             servo, self.sensor_info = self._robot.open(), self._sensor.open()
             self._check_rates(servo, self.sensor_info)
+            if self._shared and self._streams:
+                ownership.require_rest(self._robot, self._clock)
             if self._streams and servo.lookahead > LONGEST_LOOKAHEAD:
                 self._remark(
                     f"robot: lags by its look-ahead of {servo.lookahead:g} s, and above "

@@ -48,7 +48,8 @@ class CheckedPlan:
 def lifts(batch: StrokeSelection, settings: ExecuteSettings) -> bool:
     """Tell whether the pen is to be lifted: for a batch, for several strokes, or as asked.
 
-    The single stroke of a file ends where it ends, and the pen stays there.
+    The single stroke of a file ends where it ends, and the pen stays there; to its start it is led
+    through the air all the same, where it stands elsewhere.
     """
     return batch.folder or len(batch.found) > 1 or settings.clearance is not None
 
@@ -116,13 +117,14 @@ def prepare(
         The arm is not ready, or the strokes lie on faces that look different ways.
     """
     strokes, state = batch.strokes, arm.servo.state()
-    if not lifts(batch, settings):
-        return [CheckedPlan(*execution.prepare(strokes[0], settings, state, reach))]
-    between = ways(settings, arm.info.lookahead, presses)
+    leave = lifts(batch, settings)
     guards.check_ready(state)
-    start, limits = (state.position, state.rotation), limits_of(settings)
     standing = execution.standing(strokes[0], settings, state)
     near = all(check.passed for check in standing)
+    if not leave and (near or settings.approach is None):
+        return [CheckedPlan(*execution.prepare(strokes[0], settings, state, reach))]
+    between = ways(settings, arm.info.lookahead, presses)
+    start, limits = (state.position, state.rotation), limits_of(settings)
     if settings.approach is None:
         standing = [replace(check, remedy=_COME) for check in standing]
     else:
@@ -130,7 +132,15 @@ def prepare(
     joints = None if reach is None else reach.standing(state.joints, *start)
     judged: list[CheckedPlan] = []
     made = transfers.plans(
-        strokes, settings.period, settings.speed, limits, start, near, between, settings.approach
+        strokes,
+        settings.period,
+        settings.speed,
+        limits,
+        start,
+        near,
+        between,
+        settings.approach,
+        leave,
     )
     for stroke, plan in zip(strokes, made, strict=True):
         checks, joints = execution.judge(stroke, plan, settings, standing, reach, joints)

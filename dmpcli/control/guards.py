@@ -29,6 +29,21 @@ def check_streams(robot: Servo) -> None:
         raise InputError("--robot: mode=file only plays whole plans; leave it out")
 
 
+def check_playing(robot: Servo, allowed: bool) -> None:
+    """Refuse a robot that plays a plan by itself, before it is opened, unless that is meant.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(robot, PlanPlayer) and not allowed:
+        raise InputError(
+            "--robot: with mode=file the arm draws on when the link or this computer fails, and "
+            "only the pendant and the emergency stop end it then; leave it out, or give "
+            "--allow-file-mode if somebody stands there"
+        )
+
+
 def check_ready(state: RobotState) -> None:
     """Refuse to go on where the arm may not move, in the controller's words.
 

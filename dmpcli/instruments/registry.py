@@ -3,7 +3,8 @@
 The name of an entry point is the URL's scheme, its value a factory ``make(address, clock)`` that
 returns a `Sensor` or a `ServoDriver`. Those of this package are registered in the same way as those
 of any other. A factory whose attribute ``lock_step`` is true makes instruments that have no time of
-their own: their world goes on as far as the clock that they are given, real or simulated.
+their own: their world goes on as far as the clock that they are given, real or simulated. Its
+attribute ``port`` is the port that a URL without one means.
 """
 
 from collections.abc import Callable
@@ -69,6 +70,18 @@ def lock_step(address: Address) -> bool:
         Its driver cannot be had.
     """
     return bool(getattr(_load(address.role, address.scheme), "lock_step", False))
+
+
+def default_port(address: Address) -> int | None:
+    """Return the port that a URL without one means; None where its factory does not say.
+
+    Raises
+    ------
+    InputError
+        Its driver cannot be had.
+    """
+    port = getattr(_load(address.role, address.scheme), "port", None)
+    return port if isinstance(port, int) else None
 
 
 def _installed(role: str) -> "EntryPoints":

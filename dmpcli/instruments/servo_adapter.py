@@ -62,17 +62,31 @@ class PoseServo:
         self._space = _joint_space(declared, self._tool)
         said = self._driver.state()
         joints, pose = self._joints_of(said), self._reported(said)
-        if self._space is not None and joints is not None and pose is not None:
-            self._space.check(joints, pose)
-            if isinstance(self._driver, InverseDriver):
+        # Driven by poses, a robot has a TCP of its own, which without a tool file is the one meant.
+        known = self._space if declared.space == "joint" or self._tool is None else self._by_model
+        if known is not None and joints is not None and pose is not None:
+            known.check(joints, pose)
+            if isinstance(self._driver, InverseDriver) and self._space is not None:
                 self._space.check_inverse(joints, self._theirs)
         return declared
 
     @property
-    def reach(self) -> Reach | None:
-        """The arm and its tool, once open; None for a robot that is driven by poses."""
+    def _by_model(self) -> JointSpace | None:
+        """The kinematics of the model that the driver names, whatever it is driven by."""
         declared = self._declared
-        if declared.space == "pose" or declared.model is None:
+        if declared.model is None:
+            return None
+        return JointSpace(models.model(declared.model), declared, self._tool)
+
+    @property
+    def reach(self) -> Reach | None:
+        """The arm and its tool, once open; None for a robot whose kinematics are not known.
+
+        One that is driven by poses is judged only with a tool: what it takes for its TCP is not
+        known here otherwise.
+        """
+        declared = self._declared
+        if declared.model is None or (declared.space == "pose" and self._tool is None):
             return None
         arm = models.model(declared.model)
         return Reach(arm, self._tool, declared.base_turn, declared.flange_turn)

@@ -27,7 +27,7 @@ def connect(host: str, port: int, patience: float, what: str) -> socket.socket:
     """
     deadline = time.monotonic() + patience
     reason = "no answer"
-    for family, kind, protocol, _, address in _resolved(host, port, patience, what):
+    for family, kind, protocol, _, address in resolved(host, port, patience, what):
         left = deadline - time.monotonic()
         if left <= 0.0:
             break
@@ -49,7 +49,14 @@ def words(error: OSError) -> str:
     return "no answer" if isinstance(error, TimeoutError) else error.strerror or str(error)
 
 
-def _resolved(host: str, port: int, patience: float, what: str) -> list[Any]:
+def resolved(host: str, port: int, patience: float, what: str) -> list[Any]:
+    """Look a host up, or say within `patience` s that it is not known; see `connect`.
+
+    Returns
+    -------
+    list of tuple
+        As of `socket.getaddrinfo`.
+    """
     # The resolver has no timeout of its own; a name that nobody knows may take it many seconds.
     found: list[Any] = []
 

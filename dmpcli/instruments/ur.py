@@ -13,7 +13,7 @@ compensation of a tool expects.
 import contextlib
 import socket
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -43,6 +43,11 @@ VARIABLES = (
 )
 """What the robot is asked to send, every cycle."""
 
+_MODELS = {"none": None, "ur5e": "ur5e"}
+_REMEDY = "; see --tool, the TCP that is set on the robot and, in the URL, model=none, check=MM"
+# Of the orientation, per mm of the position's tolerance, rad.
+_TURN_PER_MM = 0.01
+
 _PATIENCE = 1.0
 # Without a new time stamp from the controller for so long, s, its state is not believed.
 _SILENCE = 0.2
@@ -59,6 +64,8 @@ _SAFETY: dict[int, tuple[RobotMode, str]] = {
     8: ("fault", "safety violation"),
     9: ("fault", "safety fault"),
 }
+# The longest answer of the dashboard that is read.
+_LINE = 256
 _REQUEST_VERSION = struct.pack(">HBH", 5, ord("V"), 2)
 
 
@@ -80,9 +87,14 @@ def make(address: Address, clock: Clock) -> "UrDriver":
         gain=options.number("gain", 300.0, 100.0, 2000.0, ""),
         deceleration=options.number("deceleration", 10.0, 0.1, 100.0, "m/s²"),
         watchdog=options.number("watchdog", 10.0, 1.0, 100.0, "Hz"),
+        model=_MODELS[options.choice("model", "none", *_MODELS)],
+        tolerance=options.number("check", 5.0, 0.1, 100.0, "mm"),
     )
     options.done()
     return driver
+
+
+make.port = RTDE_PORT  # type: ignore[attr-defined]  # see `registry`
 
 
 class UrDriver:
@@ -101,6 +113,10 @@ class UrDriver:
         Of the stop, m/s².
     watchdog : float
         The robot stops by itself when set-points come less often, Hz.
+    model : str or None
+        Name of its kinematics, with which reach, joints and TCP are checked.
+    tolerance : float
+        By how much the TCP may differ from the model's, mm.
     """
 
     def __init__(
@@ -112,10 +128,12 @@ class UrDriver:
         gain: float,
         deceleration: float,
         watchdog: float,
+        model: str | None = None,
+        tolerance: float = 5.0,
     ) -> None:
         self._host, self._clock = host, clock
         self._lookahead, self._gain, self._deceleration = lookahead, gain, deceleration
-        self._watchdog = watchdog
+        self._watchdog, self._model, self._tolerance = watchdog, model, tolerance
         self._period = 0.0
         self._receive: Any = None
         self._control: Any = None
@@ -146,6 +164,9 @@ class UrDriver:
             length="m",
             angle="rad",
             orientation="rotation vector",
+            model=self._model,
+            tolerance=(self._tolerance, _TURN_PER_MM * self._tolerance),
+            remedy=_REMEDY,
         )
 
     def state(self) -> DriverState:
@@ -243,13 +264,42 @@ class UrDriver:
         control = self._control
         if not self._servoing or control is None:
             return
-        done = self._asked("servoStop", lambda: control.servoStop(self._deceleration))
-        if not done and self._asked("program", control.isProgramRunning):
-            raise InstrumentError(
-                f"{self._name}: did not do servoStop; it may still be moving: press its emergency "
-                "stop"
-            )
+        try:
+            if not self._asked("servoStop", lambda: control.servoStop(self._deceleration)):
+                raise InstrumentError(f"{self._name}: did not do servoStop")
+        except InstrumentError as failure:
+            self._stop_otherwise(failure)
         self._servoing = False  # only now: what failed is tried again
+
+    def halt(self) -> None:
+        """Stop the program on the robot by its dashboard, beside whatever else hangs.
+
+        Raises
+        ------
+        InstrumentError
+            The dashboard cannot be reached, or does not do it.
+        """
+        with self._open(DASHBOARD_PORT) as link, _failing(f"{self._name}: dashboard"):
+            link.settimeout(_PATIENCE)
+            with link.makefile("rw", encoding="utf-8", errors="replace", newline="\n") as lines:
+                lines.readline(_LINE)  # it greets first
+                lines.write("stop\n")
+                lines.flush()
+                answer = lines.readline(_LINE).strip()
+        if not answer.startswith("Stopped"):
+            raise InstrumentError(f"{self._name}: dashboard: stop: answers {answer[:60]!r}")
+
+    def _stop_otherwise(self, failure: InstrumentError) -> None:
+        """Stop what did not do servoStop, unless nothing moves it any more."""
+        with contextlib.suppress(InstrumentError):
+            if not self._asked("program", self._control.isProgramRunning):
+                return
+        try:
+            self.halt()
+        except InstrumentError as beside:
+            raise InstrumentError(
+                f"{failure}; {beside}; it may still be moving: press its emergency stop"
+            ) from None
 
     def close(self) -> None:
         """Stop, end the script and disconnect, whatever fails on the way."""
@@ -322,6 +372,14 @@ class UrDriver:
         except (RuntimeError, OSError, ValueError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise InstrumentError(f"{self._name}: {what} failed: {said}") from None
+
+
+@contextlib.contextmanager
+def _failing(what: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InstrumentError(f"{what}: {sockets.words(error)}") from None
 
 
 def _package(name: str) -> Any:

@@ -49,7 +49,20 @@ _EC66 = Arm(
     speeds=np.radians([150.0, 150.0, 190.0, 260.0, 260.0, 260.0]),
 )
 
-_MODELS = {arm.name: arm for arm in (_EC66,)}
+# Universal Robots UR5e: the maker's published DH parameters (its support article "DH parameters for
+# calculations of kinematics and dynamics"), joint ranges and speeds of its data sheet. Each arm
+# leaves the factory with corrections of its own, of a millimetre or so.
+_UR5E = Arm(
+    name="ur5e",
+    d=np.array([162.5, 0.0, 0.0, 133.3, 99.7, 99.6]),
+    a=np.array([0.0, -425.0, -392.2, 0.0, 0.0, 0.0]),
+    alpha=np.radians([90.0, 0.0, 0.0, 90.0, -90.0, 0.0]),
+    offset=np.zeros(6),
+    limits=np.radians(np.outer([360.0] * 6, [-1.0, 1.0])),
+    speeds=np.radians([180.0] * 6),
+)
+
+_MODELS = {arm.name: arm for arm in (_EC66, _UR5E)}
 
 
 def names() -> list[str]:

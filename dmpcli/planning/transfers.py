@@ -90,7 +90,12 @@ def off(stroke: PlannedStroke, held: Floats, end: int) -> Floats:
     return np.asarray(-R[:, 2])
 
 
-def height(strokes: Sequence[PlannedStroke], held: Floats, clearance: float) -> Height:
+def height(
+    strokes: Sequence[PlannedStroke],
+    held: Floats,
+    clearance: float,
+    ends: tuple[int, ...] = (0, -1),
+) -> Height:
     """Find a height at which the tool may go from any stroke to any other.
 
     Parameters
@@ -101,13 +106,15 @@ def height(strokes: Sequence[PlannedStroke], held: Floats, clearance: float) -> 
         Orientation where a stroke states none.
     clearance : float
         mm.
+    ends : tuple of int
+        Ends of a stroke that a way leads to or off: 0, -1.
 
     Raises
     ------
     RefusedError
         There is none: the strokes lie on faces that look different ways.
     """
-    ways = np.array([off(stroke, held, end) for stroke in strokes for end in (0, -1)])
+    ways = np.array([off(stroke, held, end) for stroke in strokes for end in ends])
     up = np.array([0.0, 0.0, 1.0])
     if (ways @ up).min() < LEAN:
         mean = ways.sum(axis=0)
@@ -115,7 +122,7 @@ def height(strokes: Sequence[PlannedStroke], held: Floats, clearance: float) -> 
         up = mean / length if length > 0.0 else up
     leaning = ways @ up
     if leaning.min() < LEAN:
-        worst = strokes[int(np.argmin(leaning)) // 2].id
+        worst = strokes[int(np.argmin(leaning)) // len(ends)].id
         raise RefusedError(
             f"stroke {worst}: faces another side of the work than the others, and no one way "
             "through the air leads to all; draw each side in a run of its own with --id"
@@ -133,6 +140,7 @@ def plans(
     near: bool,
     ways: TransferOptions,
     approach: float | None = None,
+    leave: bool = True,
 ) -> Iterator[Plan]:
     """Plan the strokes one after another, each with the way to it and off it.
 
@@ -158,6 +166,8 @@ def plans(
     ways : TransferOptions
     approach : float, optional
         Peak speed of the way to the first stroke, if it is less than that of the others, mm/s.
+    leave : bool
+        Whether the tool leaves the work after each stroke; a single one may end where it ends.
 
     Raises
     ------
@@ -166,7 +176,7 @@ def plans(
     RefusedError
         No height is free of the work.
     """
-    over = height(strokes, start[1], ways.clearance)
+    over = height(strokes, start[1], ways.clearance, (0, -1) if leave else (0,))
     travel = _Travel(over, period, limits, ways, min(speed, 1.0))
     first = replace(travel, ways=_slowed(ways, approach))
     here, count = start, 0
@@ -176,7 +186,7 @@ def plans(
             before = travel.to(here, sampled)
         else:
             before = first.led(here, sampled) if near else first.to(here, sampled)
-        after = travel.off(sampled)
+        after = travel.off(sampled) if leave else []
         made = planning.joined(sampled, before, after, period, stroke.rotation is not None)
         count += len(made)
         if count > LONGEST_TOUR:

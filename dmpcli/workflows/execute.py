@@ -10,6 +10,7 @@ from dmpcli.control import (
     execution,
     execution_plan,
     guards,
+    ownership,
     preflight_table,
     stopping,
     stroke_file,
@@ -73,6 +74,8 @@ class ExecutionRequest:
         Replace an existing run.
     dry_run : bool
         Check, and move nothing.
+    allow_file_mode : bool
+        Let the controller play the plan, though the arm draws on if the link is lost.
     """
 
     trajectory: str | Source
@@ -87,6 +90,7 @@ class ExecutionRequest:
     allow_mixed: bool = False
     force: bool = False
     dry_run: bool = False
+    allow_file_mode: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,11 +173,15 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         scene=scene,
         tool=held,
     )
+    guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
     if bench.note:
         tell(bench.note)
     robot = watched(bench.robot) if realtime else bench.robot
+    lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
+    lock.take()
     try:
         arm = ReadyArm(robot, robot.open(), clock)
+        lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
             warn(late)
@@ -190,7 +198,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         provenance.facts.update(execution.facts_of(arm, coupling, settings))
         outcome, made = _stream(loop, provenance, realtime, keeper)
     finally:
-        closing = guards.leave(robot.close, bench.sensor.close)
+        closing = guards.leave(robot.close, bench.sensor.close, lock.release)
     with stopping.outranking(lambda: outcome.stop):
         if realtime:
             tell(str(loop.timing))

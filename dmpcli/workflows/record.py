@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dmpcli.control import keyboard, stopping, workcell
+from dmpcli.control import keyboard, ownership, stopping, workcell
 from dmpcli.control.cycle import LoopOutcome
 from dmpcli.control.drag_loop import DEFECT, Recorder
 from dmpcli.control.watchdog import watched
@@ -116,7 +116,7 @@ def record(
     tutored = None if bench.lab is None else stroke
     provenance = provenance_of(settings, options, bench.simulated, tool_source, tutored)
     # Entered until the file is there: a signal meanwhile must not cost the recording.
-    with interruptible(realtime) as signals:
+    with ownership.ArmLock(addresses[0]) as lock, interruptible(realtime) as signals:
         recorder = Recorder(
             watched(bench.robot) if realtime else bench.robot,
             bench.sensor,
@@ -130,6 +130,7 @@ def record(
             rehearsed.lead_in,
             keeper.hindrance,
             warn,
+            lock.shared,
         )
         if settings.workspace is None:
             tell(f"stays within {ROOM:g} mm of the start in x, y and z; --workspace says otherwise")

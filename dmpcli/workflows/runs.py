@@ -90,6 +90,7 @@ def execute(
     dry_run: bool = False,
     realtime: bool = False,
     allow_mixed: bool = False,
+    allow_file_mode: bool = False,
     force: bool = False,
     preset: str | None = None,
     config: str | Path | None = None,
@@ -109,7 +110,7 @@ def execute(
         URLs.
     dry_run : bool
         Move nothing; return each stroke as planned, with its checks.
-    tool, robot_model, coupling, realtime, allow_mixed, force, preset, config
+    tool, robot_model, coupling, realtime, allow_mixed, allow_file_mode, force, preset, config
         As the options of ``dmpcli execute``.
     **settings
         Its other options, with underscores, and the keys of its TOML section.
@@ -142,6 +143,7 @@ def execute(
             allow_mixed,
             force,
             dry_run,
+            allow_file_mode,
         )
         done = executing.execute(resolved, request)
     if done.run is None:

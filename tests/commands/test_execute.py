@@ -172,10 +172,17 @@ def test_an_approach_leads_to_the_start(traj, tmp_path):
     execute(traj, "-o", out, "--robot", "mock:?x=-520&rz=0.1", "--approach", 30)
     run = run_of(out)
     phases = list(dict.fromkeys(run.columns["phase"]))
-    assert phases == ["approach", "stroke", "stop"]
-    speed = np.linalg.norm(np.diff(run.position("sent"), axis=0), axis=1) / 0.02
-    approach = run.columns["phase"][1:] == "approach"
-    assert speed[approach].max() <= 30.0 + 1e-6
+    assert phases == ["transfer", "approach", "stroke", "stop"]
+    sent = run.position("sent")
+    speed = np.linalg.norm(np.diff(sent, axis=0), axis=1) / 0.02
+    ways = np.isin(run.columns["phase"][1:], ("transfer", "approach"))
+    assert speed[ways].max() <= 30.0 + 1e-6
+    # Up, across, and down: never along the plate, on which the pen may stand.
+    across = np.linalg.norm(np.diff(sent[:, :2], axis=0), axis=1) > 1e-6
+    on_the_way = ways & across
+    assert on_the_way.sum() > 50
+    np.testing.assert_allclose(sent[1:][on_the_way, 2], START[2] + 20.0, atol=1e-6)
+    assert run.columns["z"][-1] == pytest.approx(START[2], abs=0.01), "the pen stays at the end"
 
 
 def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):

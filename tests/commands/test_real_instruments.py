@@ -153,6 +153,11 @@ def test_a_stroke_is_drawn_by_the_virtual_arm_and_logged(mode, traj, pen, tmp_pa
             f"&mode={mode}&lookahead=0.5&oldest=0.5"
         )
         options = ("--robot", url, "--tool", pen, "--speed", 0.5, "--approach", 100)
+        if mode == "file":
+            refused = dmpcli("execute", traj, "-o", out, *options, expect=2)
+            assert "--allow-file-mode if somebody stands there" in last_line(refused)
+            dmpcli("execute", traj, "--dry-run", *options, expect=0)
+            options += ("--allow-file-mode",)
         dmpcli("execute", traj, "-o", out, *options, expect=0)
     finally:
         service.close()

@@ -29,7 +29,7 @@ class Wrong:
         For people.
     hides : set of str
         What a judge must not rest on then: ``rest`` where nobody can see whether the arm rests,
-        ``disk`` where nothing can be kept, ``force`` where what is felt is wrong on purpose.
+        ``stop`` where it cannot be told to stop, ``disk`` where nothing can be kept.
     """
 
     words: list[str] = field(default_factory=list)
@@ -104,6 +104,7 @@ def reply_late(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     now, after = _once(bench, rng)
     delay = float(10.0 ** rng.uniform(-2.0, 0.5))
     _replies(bench, lambda r: [(r, delay)] if now() else None)
+    wrong.hides.add("stop")
     wrong.words.append(f"a reply comes {delay:.3f} s late, {after:.2f} s in")
 
 
@@ -111,6 +112,7 @@ def reply_late(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 def reply_lost(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     now, after = _once(bench, rng)
     _replies(bench, lambda _: [] if now() else None)
+    wrong.hides.add("stop")
     wrong.words.append(f"a reply is lost, {after:.2f} s in")
 
 
@@ -118,6 +120,7 @@ def reply_lost(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 def reply_twice(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     now, after = _once(bench, rng)
     _replies(bench, lambda r: [(r, 3e-4), (r, 4e-4)] if now() else None)
+    wrong.hides.add("stop")
     wrong.words.append(f"a reply comes twice, {after:.2f} s in")
 
 
@@ -133,6 +136,7 @@ def reply_torn(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
         return [(bytes(bent), 3e-4)]
 
     _replies(bench, torn)
+    wrong.hides.add("stop")
     wrong.words.append(f"a byte of a reply is wrong, {after:.2f} s in")
 
 
@@ -150,6 +154,7 @@ def reply_in_pieces(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 def robot_slow(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     most = float(rng.uniform(0.005, 0.06))
     _replies(bench, lambda r: [(r, float(rng.uniform(0.0, most)))])
+    wrong.hides.add("stop")
     wrong.words.append(f"replies take up to {most:.3f} s")
 
 
@@ -157,6 +162,7 @@ def robot_slow(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 def robot_mute(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     on, after = _from(bench, rng)
     _replies(bench, lambda _: [] if on() else None)
+    wrong.hides.add("stop")
     wrong.words.append(f"no reply any more from {after:.2f} s in")
 
 
@@ -169,6 +175,7 @@ def robot_cut(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
         bench.exchange.refuses |= forever
 
     after = _when(bench, rng, cut)
+    wrong.hides.add("stop")
     wrong.words.append(f"the connection is cut {'for good ' if forever else ''}{after:.2f} s in")
 
 
@@ -191,15 +198,15 @@ def arm_stands(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 
 
 @_kind
-def stop_refused(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
-    """The stop is answered by no; the arm goes on with what it has."""
+def stop_fails(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
+    """The stop is not answered, or by no, or by yes; the arm goes on with what it has."""
     call = bench.lab.call
     kept = ("tt_clear_servo_joint_buf", "stop", "stop_trajectory", "pause_trajectory")
-    mute = bool(rng.integers(2))
-    bench.answers = lambda m, p: (
-        (None if mute else False) if m in kept and bench.sent else call(m, p)
-    )
-    wrong.words.append(f"stops are {'not answered' if mute else 'refused'}")
+    how = int(rng.integers(3))
+    answer = (None, False, True)[how]
+    bench.answers = lambda m, p: answer if m in kept and bench.entered else call(m, p)
+    wrong.hides.add("stop")
+    wrong.words.append(f"stops are {('not answered', 'refused', 'said to be done')[how]}")
 
 
 # Monitor frames.
@@ -209,6 +216,7 @@ def stop_refused(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 def frames_stop(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     on, after = _from(bench, rng)
     _frames(bench, lambda _: [] if on() else None)
+    bench.must_stop.append(after + 0.15)
     wrong.words.append(f"no frames any more from {after:.2f} s in")
 
 
@@ -319,6 +327,7 @@ def clock_slews(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 @_kind
 def monitor_cut(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     after = _when(bench, rng, lambda: bench.exchange.cut(MONITOR_PORT))
+    bench.must_stop.append(after)
     wrong.words.append(f"the monitor is cut {after:.2f} s in")
 
 
@@ -399,7 +408,6 @@ def sensor_frozen(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
         bench.box.reading = lambda _: held  # type: ignore[method-assign]
 
     after = _when(bench, rng, freeze)
-    wrong.hides.add("force")
     wrong.words.append(f"the sensor's values stand {after:.2f} s in")
 
 
@@ -408,7 +416,6 @@ def sensor_biased(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     """Another client sets the box's bias."""
     axis, newtons = int(rng.integers(3)), float(rng.uniform(3.0, 20.0) * rng.choice([-1, 1]))
     after = _when(bench, rng, lambda: bench.box.set_bias(axis, int(newtons * 1e6)))
-    wrong.hides.add("force")
     wrong.words.append(f"the box's bias changes by {newtons:.1f} N {after:.2f} s in")
 
 

@@ -1,10 +1,10 @@
 """One run: a command on the bench, with the faults of its seed, and what a judge says of it."""
 
-import re
+import os
 import signal
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -23,7 +23,7 @@ from dmpcli.kinematics.models import model
 from dmpcli.records import file_io, record, schemas, tool
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.elite_server.lab import ROBOT_MODEL, LabParameters
-from dmpcli.simulation.mock import PEN
+from dmpcli.simulation.mock import PEN, Plate
 from tests.faults.bench import Bench
 from tests.faults.faults import KINDS, Wrong
 
@@ -34,9 +34,7 @@ ALLOWED = {0, 2, 3, 4, *(128 + n for n in (signal.SIGINT, signal.SIGTERM, signal
 # mm/s of the TCP: an arm at rest; and how long it may go on after the command, s.
 _REST, _AFTER = 0.5, 0.3
 # What a person is told where the arm was not seen at rest.
-_UNSURE = re.compile(
-    r"emergency stop|may still be moving|could NOT be stopped|not (seen|confirmed)"
-)
+_UNSURE = "THE ARM MAY STILL MOVE"
 
 
 @dataclass
@@ -95,7 +93,7 @@ def folder() -> Path:
         t = 0.02 * np.arange(41)
         u = t / t[-1]
         u = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-        path = np.column_stack([-20.0 * u, 12.0 * u, 4.0 * np.sin(2.0 * np.pi * u)])
+        path = np.column_stack([-20.0 * u, 12.0 * u + 4.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
         x, y, z = (START + scale * path).T
         columns = {"id": np.full(len(t), "0", dtype=object), "t": t, "x": x, "y": y, "z": z}
         facts = {"tau": float(t[-1]), "normal": [0.0, 0.0, 1.0]}
@@ -104,13 +102,13 @@ def folder() -> Path:
     return made
 
 
-def run(seed: int, kinds: list[str] | None = None, command: str | None = None) -> Finding:
+def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = None) -> Finding:
     """Run one seed.
 
     Parameters
     ----------
     seed : int
-    kinds : list of str, optional
+    kinds : tuple of str, optional
         Faults to put on; by the seed otherwise, none to three.
     command : str, optional
     """
@@ -127,12 +125,15 @@ def run(seed: int, kinds: list[str] | None = None, command: str | None = None) -
         str(k)
         for k in rng.choice(names, int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1])), replace=False)
     ]
-    chosen = chosen if kinds is None else kinds
+    chosen = chosen if kinds is None else [*kinds]
     stroke = str(rng.choice([*STROKES]))
     wrong = Wrong()
     records = command == "record"
     hand = Push(rng) if records and rng.random() < 0.6 else None
-    bench = Bench(LabParameters(START, seed=seed), hand, seed)  # type: ignore[arg-type]
+    # What is pressed on is where the plan says.
+    ground = Plate(START, np.array([0.0, 0.0, 1.0])) if command.endswith("pressed") else None
+    parameters = LabParameters(START, ground=ground, seed=seed)
+    bench = Bench(parameters, hand, seed)  # type: ignore[arg-type]
     output = folder() / f"out-{seed}.parquet"
     with ExitStack() as stack:
         for kind in chosen:
@@ -157,26 +158,21 @@ def run(seed: int, kinds: list[str] | None = None, command: str | None = None) -
 
 def _words(command: str, stroke: str, output: Path) -> list[str]:
     made = folder()
-    robot = "elite://127.0.0.1?lookahead=0.1" + ("&mode=file" if command.endswith("file") else "")
+    # Of this process alone: an arm has one owner on a computer, and several processes run seeds.
+    host = f"127.77.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+    robot = f"elite://{host}?lookahead=0.1" + ("&mode=file" if command.endswith("file") else "")
     words = ["-o", str(output), "--robot", robot, "--tool", str(made / "pen.json")]
     felt = ["--sensor", "netft://127.0.0.1"]
     if command == "record":
         return ["record", *words, *felt, "--duration", "1.3"]
     words = ["execute", str(made / f"{stroke}.parquet"), *words]
     if command.endswith("file"):
-        words.append("--allow-file-mode") if "allow_file_mode" in _options() else None
+        words.append("--allow-file-mode")
     if command.endswith("felt"):
         words += felt
     if command.endswith("pressed"):
         words += [*felt, "--coupling", "force", "--force-setpoint", "2"]
     return words
-
-
-@cache
-def _options() -> str:
-    from dmpcli.commands import execute
-
-    return Path(execute.__file__).read_text()
 
 
 @contextmanager
@@ -229,8 +225,12 @@ def _judged(
         yield f"exit {code}"
         if result.exception is not None:
             yield "".join(traceback.format_exception(*result.exc_info))[-1500:]
-    if not rest and not _UNSURE.search(told.strip().splitlines()[-1] if told.strip() else ""):
+    rest = rest or "rest" in wrong.hides
+    last = told.strip().splitlines()[-1] if told.strip() else ""
+    if not rest and _UNSURE not in last:
         yield "the arm moves on, and the last line does not say so"
+    if not rest and "stop" not in wrong.hides:
+        yield "the arm moves on, and could have been told to stop"
     if not rest and code in (0, 2, 3):
         yield f"the arm moves on, and the exit code is {code}"
     yield from _steps(finding, bench)
@@ -324,6 +324,3 @@ def _kept(finding: Finding, bench: Bench, output: Path) -> Iterator[str]:
     if output.exists():
         schema = schemas.DEMONSTRATION if finding.command == "record" else schemas.RUN
         record.decode(file_io.read(str(output)), schema)
-
-
-Report = Callable[[Finding], None]

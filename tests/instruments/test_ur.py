@@ -17,7 +17,9 @@ from dmpcli.instruments import registry, ur
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock, SimulatedClock
 from dmpcli.instruments.servo_adapter import PoseServo
-from dmpcli.spatial.rotations import exp
+from dmpcli.kinematics import chain, models
+from dmpcli.simulation.mock import PEN
+from dmpcli.spatial.rotations import exp, log
 from tests.extras_here import needs
 from tests.instruments import rtde_server
 
@@ -324,6 +326,81 @@ def test_a_stop_that_was_not_done_is_told_and_tried_again(started):
     made.stop()
     made.stop()
     assert control.names().count("servoStop") == 2
+
+
+@pytest.fixture
+def dashboard(monkeypatch):
+    """A dashboard server of one line; `answer` is what it says to stop."""
+    said = types.SimpleNamespace(asked=[], answer="Stopped\n")
+
+    def link(self, port):
+        assert port == ur.DASHBOARD_PORT
+        here, there = socket.socketpair()
+
+        def serve():
+            with there, there.makefile("rw", newline="\n") as lines:
+                lines.write("Connected: Universal Robots Dashboard Server\n")
+                lines.flush()
+                said.asked.append(lines.readline())
+                lines.write(said.answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        return here
+
+    def install():
+        monkeypatch.setattr(ur.UrDriver, "_open", link)
+        return said
+
+    return install
+
+
+@pytest.mark.parametrize("how", ["fails", "refuses"])
+def test_what_does_not_do_servo_stop_is_stopped_by_the_dashboard(started, dashboard, how):
+    made, _, control = started
+    said = dashboard()
+    made.send(np.array(POSE))
+    if how == "fails":
+        control.fails = {"servoStop", "isProgramRunning"}
+    else:
+        control.stops = False
+    made.stop()
+    assert said.asked == ["stop\n"]
+    made.stop()
+    assert len(said.asked) == 1
+
+
+def test_it_can_be_stopped_while_a_call_hangs(started, dashboard):
+    made, said = started[0], dashboard()
+    servo = PoseServo(made, SimulatedClock())
+    assert servo.halt()
+    assert said.asked == ["stop\n"]
+    said.answer = "Failed to execute: stop\n"
+    with pytest.raises(InstrumentError, match="dashboard: stop: answers 'Failed to execute: stop'"):
+        made.halt()
+
+
+def standing(fakes, monkeypatch, offset):
+    """A UR5e whose TCP is set `offset` mm beyond its flange."""
+    arm = models.model("ur5e")
+    position, rotation = chain.forward(arm, np.array(JOINTS))
+    tip = (position + rotation @ [0.0, 0.0, offset]) / 1000.0
+    pose = [*tip, *log(rotation)]
+    monkeypatch.setattr(FakeReceive, "getActualTCPPose", lambda self: pose)
+
+
+def test_the_tools_tcp_is_compared_with_the_robots(fakes, monkeypatch):
+    standing(fakes, monkeypatch, float(PEN.tcp_position[2]))
+    servo = PoseServo(driver(model="ur5e"), SimulatedClock(), PEN)
+    servo.open()
+    assert servo.reach.arm is models.model("ur5e")
+    standing(fakes, monkeypatch, float(PEN.tcp_position[2]) + 7.0)
+    with pytest.raises(RefusedError, match=r"7\.0 mm and .*the TCP that is set on the robot"):
+        PoseServo(driver(model="ur5e"), SimulatedClock(), PEN).open()
+    PoseServo(driver(model="ur5e", check="10"), SimulatedClock(), PEN).open()
+    for options, tool in (({}, PEN), ({"model": "ur5e"}, None)):
+        unknown = PoseServo(driver(**options), SimulatedClock(), tool)
+        unknown.open()
+        assert unknown.reach is None
 
 
 def test_close_stops_an_arm_that_is_still_moving_and_goes_on_after_a_failure(started):

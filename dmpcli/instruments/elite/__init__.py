@@ -3,7 +3,7 @@
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.driver_protocol import ServoDriver
 from dmpcli.instruments.elite.file_driver import FileDriver
-from dmpcli.instruments.elite.settings import read
+from dmpcli.instruments.elite.settings import RPC_PORT, read
 from dmpcli.instruments.elite.stream_driver import StreamDriver
 from dmpcli.instruments.protocols import Clock
 
@@ -24,3 +24,6 @@ def make(address: Address, clock: Clock) -> ServoDriver:
     """
     settings = read(address)
     return FileDriver(settings, clock) if settings.mode == "file" else StreamDriver(settings, clock)
+
+
+make.port = RPC_PORT  # type: ignore[attr-defined]  # see `registry`

@@ -15,6 +15,7 @@ from dmpcli.instruments.elite.monitor import Monitor
 from dmpcli.instruments.elite.requests import Params, Requests
 from dmpcli.instruments.elite.settings import RPC_PORT, EliteSettings
 from dmpcli.instruments.protocols import Clock, RobotMode
+from dmpcli.messages import warn
 
 MAKE, MODEL = "Elite EC66", "ec66"
 
@@ -191,17 +192,40 @@ class Controller:
         if ask.whole("get_estop_status", 0, 1):
             raise RefusedError(f"{self.name}: emergency stop; release it and clear the alarm")
         state = ask.whole("getRobotState", _STOP, _COLLISION)
-        if state not in (_STOP, _PLAY):
+        if state not in (_STOP, _PLAY) and not (state == _PAUSE and self._settings.take_over):
             raise RefusedError(
                 f"{self.name}: {_STATES[state]}; clear it on the pendant or, once its cause is "
                 "gone, with clear_alarm=yes in the URL"
             )
         self._power()
+        self.take_over()
+        self._await_stop()
+
+    def take_over(self) -> None:
+        """End what a crash has left: a transmission, or where that is asked for another motion.
+
+        Raises
+        ------
+        RefusedError
+            The arm moves in it, so that it is somebody's.
+        InstrumentError
+            The controller does not end it.
+        """
+        ask = self.requests
         if ask.whole("get_transparent_transmission_state", 0, 1):
+            self._refuse_moving("in a transmission of another program")
             ask.deed("tt_clear_servo_joint_buf", {"clear": 0})
             if ask.whole("get_transparent_transmission_state", 0, 1):
                 raise InstrumentError(f"{self.name}: does not leave an older transmission")
-        self._await_stop()
+            warn(f"{self.name}: took over a transmission that was left open, and emptied it")
+        elif self._settings.take_over and ask.whole("getRobotState", _STOP, _COLLISION) in (
+            _PLAY,
+            _PAUSE,
+        ):
+            self._refuse_moving("by another program")
+            for method in ("stop_trajectory", "stop"):
+                ask.deed(method)
+            warn(f"{self.name}: ended a motion that was left under way, as take_over=yes asks")
 
     def halt(self, *stops: tuple[str, Params]) -> None:
         """Ask for a stop in every way given, in order, on a new connection where the old is gone.
@@ -295,10 +319,21 @@ class Controller:
         latest = self._clock.now() + _STOP_TIME
         while (state := self.requests.whole("getRobotState", _STOP, _COLLISION)) == _PLAY:
             if self._clock.now() > latest:
-                raise RefusedError(f"{self.name}: a program is running; stop it on the pendant")
+                raise RefusedError(
+                    f"{self.name}: a program is running; stop it on the pendant, or, where it was "
+                    "left by a crash and the arm stands, with take_over=yes in the URL"
+                )
             self._clock.sleep_until(self._clock.now() + _POWER_STEP)
         if state != _STOP:
             raise RefusedError(f"{self.name}: {_STATES[state]}; clear it on the pendant")
+
+    def _refuse_moving(self, how: str) -> None:
+        """Refuse to cut into a motion: whoever left one has an arm that stands."""
+        before = self.fresh_joints()
+        self._clock.sleep_until(self._clock.now() + _STILL_TIME)
+        turned = float(np.abs(self.fresh_joints() - before).max())
+        if not turned <= _STILL:
+            raise RefusedError(f"{self.name}: moves {how}; stop that, or wait for its end")
 
     def _powered(self, report: Report) -> bool:
         return report.servo_ready and report.motors_synchronised

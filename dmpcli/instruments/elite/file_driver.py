@@ -65,6 +65,7 @@ class FileDriver(ArmDriver):
         if targets.ndim != 2 or targets.shape[1] != 6 or not np.isfinite(targets).all():
             raise ValueError("joint angles of shape (n, 6) are needed, and finite ones")
         ask = self._controller.requests
+        self._controller.take_over()  # before anything is sent that ending it might flush
         ask.deed(
             "start_push_pos",
             {

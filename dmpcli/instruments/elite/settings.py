@@ -33,6 +33,9 @@ class EliteSettings:
         ``auto``: synchronise and switch the servos on when motion begins; ``manual``: refuse.
     clear_alarm : bool
         Whether an alarm is cleared at the start.
+    take_over : bool
+        Whether a motion that the controller says is under way, though the arm stands still, is
+        ended; a transmission always is.
     tool, coordinate : int
         Tool and coordinate system of the pose that is checked; -1 is the present tool and the base.
     orientation : str
@@ -60,6 +63,7 @@ class EliteSettings:
     responses: bool
     servo: str
     clear_alarm: bool
+    take_over: bool
     tool: int
     coordinate: int
     orientation: Orientation
@@ -91,6 +95,7 @@ def read(address: Address) -> EliteSettings:
         responses=options.flag("responses", True),
         servo=options.choice("servo", "auto", "auto", "manual"),
         clear_alarm=options.flag("clear_alarm", False),
+        take_over=options.flag("take_over", False),
         tool=options.whole("tool", -1, -1, 7),
         coordinate=options.whole("coordinate", -1, -1, 7),
         orientation=EULER[options.choice("euler", "xyz", *EULER)],

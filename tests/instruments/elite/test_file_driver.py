@@ -21,6 +21,7 @@ def test_a_plan_is_sent_with_time_stamps_from_zero_and_checked_before_it_may_run
     del robot.asked[:]
     servo.upload(position, rotation, 0.02)
     assert robot.methods() == [
+        "get_transparent_transmission_state",
         "start_push_pos",
         *["push_pos"] * 5,
         "stop_push_pos",

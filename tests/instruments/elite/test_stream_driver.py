@@ -205,6 +205,48 @@ def test_an_older_transmission_is_left_first(robot, arm):
     assert ("tt_clear_servo_joint_buf", {"clear": 0}) in robot.asked
 
 
+def test_a_transmission_in_which_the_arm_moves_is_somebodys(robot, arm):
+    robot.running = 1
+    servo = arm()
+    servo.open()
+
+    fresh = servo._driver._controller.fresh_joints
+
+    def moving(*waited):
+        robot.joints[0] += 0.1
+        return fresh(*waited)
+
+    servo._driver._controller.fresh_joints = moving
+    with pytest.raises(RefusedError, match="moves in a transmission of another program"):
+        servo.start(0.02)
+    assert "tt_clear_servo_joint_buf" not in robot.methods()
+
+
+def test_what_was_taken_over_is_told(robot, arm, caplog):
+    robot.running = 1
+    servo = arm()
+    servo.open()
+    servo.start(0.02)
+    assert "took over a transmission that was left open" in caplog.text
+
+
+@pytest.mark.parametrize("state", [1, 3])
+def test_another_motion_is_ended_only_where_that_is_asked_for(robot, arm, caplog, state):
+    told = [state]
+    robot.answers["getRobotState"] = lambda _: told[0]
+
+    def stop(_):
+        told[0] = 0
+        return True
+
+    robot.answers["stop"] = stop
+    servo = arm(take_over="yes")
+    servo.open()
+    servo.start(0.02)
+    assert "ended a motion that was left under way" in caplog.text
+    servo.stop()
+
+
 @pytest.mark.parametrize(
     ("monitor", "mode", "detail"),
     [

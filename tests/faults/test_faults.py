@@ -1,0 +1,56 @@
+import pytest
+
+from tests.faults.planted import PLANTED
+from tests.faults.runs import run
+from tests.faults.world import World
+
+
+def told(finding):
+    return f"seed {finding.seed}: {finding.command}; {finding.faults}; exit {finding.code}\n" + (
+        "\n".join(finding.wrong) + "\n" + finding.told
+    )
+
+
+def hold(seeds):
+    broken = [finding for finding in map(run, seeds) if finding.wrong]
+    assert not broken, "\n".join(map(told, broken))
+
+
+def test_invariants_hold_whatever_fails():
+    hold(range(40))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(1000, 1200, 50))
+def test_invariants_hold_for_more_seeds(first):
+    hold(range(first, first + 50))
+
+
+def test_without_faults_every_command_is_done():
+    for command in ("execute", "execute felt", "execute pressed", "execute file", "record"):
+        finding = run(7, (), command)
+        assert (finding.code, finding.wrong) == (0, []), told(finding)
+
+
+def test_a_seed_replays_its_run():
+    once, again = run(11), run(11)
+    assert (once.faults, once.code, once.told) == (again.faults, again.code, again.told)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_defect_is_found(name):
+    plant, command, kinds = PLANTED[name]
+    with plant():
+        assert any(run(seed, kinds, command).wrong for seed in range(12)), name
+
+
+def test_events_happen_in_order_and_sleepers_are_overtaken():
+    world, seen = World(0.0), []
+    world.at(2.0, lambda: seen.append(("b", world.now())))
+    world.at(1.0, lambda: seen.append(("a", world.now())))
+    world.at(1.0, lambda: seen.append(("then", world.now())))
+    world.sleep_until(1.5)
+    assert seen == [("a", 1.0), ("then", 1.0)]
+    assert world.now() == 1.5
+    assert not world.wait(lambda: len(seen) > 3, 3.0)
+    assert (seen[-1], world.now()) == (("b", 2.0), 3.0)
