@@ -28,6 +28,16 @@ from tests.faults.bench import Bench
 from tests.faults.faults import KINDS, Wrong
 
 START = np.array([-551.03, 131.399, 245.031])
+COMMANDS = {
+    "execute": 0.29,
+    "execute felt": 0.25,
+    "execute pressed": 0.1,
+    "execute file": 0.1,
+    "record": 0.25,
+    "calibrate": 0.01,
+}
+"""What is run, and how often; a calibration takes as long as thirty strokes."""
+
 STROKES = {"stroke": 1.0, "short": 0.12}
 """What is executed; the shorter one ends within the following error that is allowed."""
 ALLOWED = {0, 2, 3, 4, *(128 + n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))}
@@ -113,12 +123,7 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
     command : str, optional
     """
     rng = np.random.default_rng([seed, 0xFA])
-    drawn = str(
-        rng.choice(
-            ["execute", "execute felt", "execute pressed", "execute file", "record"],
-            p=[0.3, 0.25, 0.1, 0.1, 0.25],
-        )
-    )
+    drawn = str(rng.choice([*COMMANDS], p=[*COMMANDS.values()]))
     command = command or drawn
     names = sorted(KINDS)
     chosen = [
@@ -134,7 +139,7 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
     ground = Plate(START, np.array([0.0, 0.0, 1.0])) if command.endswith("pressed") else None
     parameters = LabParameters(START, ground=ground, seed=seed)
     bench = Bench(parameters, hand, seed)  # type: ignore[arg-type]
-    output = folder() / f"out-{seed}.parquet"
+    output = folder() / f"out-{seed}.{'json' if command == 'calibrate' else 'parquet'}"
     with ExitStack() as stack:
         for kind in chosen:
             KINDS[kind](bench, rng, wrong, stack)
@@ -166,6 +171,9 @@ def _words(command: str, stroke: str, output: Path) -> list[str]:
     felt = ["--sensor", "netft://127.0.0.1"]
     if command == "record":
         return ["record", *words, *felt, "--duration", "1.3"]
+    if command == "calibrate":
+        few = ["--poses", "8", "--tilt", "20", "--dwell", "0.25"]
+        return ["calibrate", *words, *felt, *few, "--save", str(output.with_suffix(".parquet"))]
     words = ["execute", str(made / f"{stroke}.parquet"), *words]
     if command.endswith("file"):
         words.append("--allow-file-mode")
@@ -260,6 +268,12 @@ def _steps(finding: Finding, bench: Bench) -> Iterator[str]:
     if len(sent) < 2:
         return
     steps = np.linalg.norm(np.diff(sent, axis=0), axis=1)
+    if finding.command == "calibrate":
+        # The tool is turned about its tip.
+        away = np.linalg.norm(sent - sent[0], axis=1).max()
+        if away > 0.1:
+            yield f"a set-point leads the tip {away:.2f} mm away"
+        return
     if finding.command == "record":
         if steps.max() > 0.02 * 250.0 * 1.01:
             yield f"a set-point steps by {steps.max():.2f} mm"
@@ -304,7 +318,7 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
     lasts = bench.ended - bench.entered if bench.ended else 0.0
     if any(after < lasts - 0.15 for after in stop):
         yield f"exit 0, and the arm had to stop {min(stop):.2f} s in, of {lasts:.2f}"
-    if finding.command == "record":
+    if finding.command in ("record", "calibrate"):
         return
     kept = record.decode(file_io.read(str(output)), schemas.RUN)
     if not kept.provenance.facts["completed"]:
@@ -317,7 +331,7 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
 
 def _kept(finding: Finding, bench: Bench, output: Path) -> Iterator[str]:
     """What was logged is there: in the file or in the journal."""
-    if len(bench.sent) < 15:
+    if len(bench.sent) < 15 or finding.command == "calibrate":
         return
     journals = [p for p in output.parent.glob(f"*out-{finding.seed}*") if p != output]
     if not output.exists() and not journals:
