@@ -64,7 +64,8 @@ class ExportOptions(Settings):
         float, Ge(0), Le(180), Option("G-code: how far the tool may lean from straight down.", "°")
     ] = 5.0
     robot_model: Annotated[
-        str | None, Option("Arm of joint angles: ec66.", choices=("ec66",), unset="none")
+        str | None,
+        Option("Arm of joint angles: ec66, ur5e.", choices=("ec66", "ur5e"), unset="none"),
     ] = None
     tool: Annotated[
         Path | None,
