@@ -408,6 +408,7 @@ def sensor_frozen(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
         bench.box.reading = lambda _: held  # type: ignore[method-assign]
 
     after = _when(bench, rng, freeze)
+    bench.must_stop_with_sensor.append(after + 0.5)
     wrong.words.append(f"the sensor's values stand {after:.2f} s in")
 
 
@@ -416,6 +417,7 @@ def sensor_biased(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
     """Another client sets the box's bias."""
     axis, newtons = int(rng.integers(3)), float(rng.uniform(3.0, 20.0) * rng.choice([-1, 1]))
     after = _when(bench, rng, lambda: bench.box.set_bias(axis, int(newtons * 1e6)))
+    bench.must_stop_with_sensor.append(after)
     wrong.words.append(f"the box's bias changes by {newtons:.1f} N {after:.2f} s in")
 
 

@@ -14,10 +14,11 @@ from dmpcli.control import guards, stopping
 from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import LoopOutcome
 from dmpcli.control.signals import Interruption
+from dmpcli.errors import UnconfirmedStopError
 from dmpcli.instruments.elite.arm_driver import ArmDriver
 from dmpcli.instruments.elite.monitor import Monitor
 from dmpcli.instruments.elite.stream_driver import StreamDriver
-from dmpcli.instruments.netft.stream import Stream
+from dmpcli.instruments.netft import box_watch
 from dmpcli.workflows.run_output import RunOutput
 
 Plant: TypeAlias = Callable[[], AbstractContextManager[Any]]
@@ -56,6 +57,10 @@ def _whatever_was_last(self: Monitor, *_: object, **__: object) -> object:
     return self._newest
 
 
+def _first(_: object, before: str = "") -> UnconfirmedStopError:
+    return UnconfirmedStopError(before)
+
+
 def _dropped_stop(self: ArmDriver) -> None:
     self._begun = False
 
@@ -89,15 +94,20 @@ PLANTED: dict[str, tuple[Plant, str, tuple[str, ...]]] = {
         ("arm_stands",),
     ),
     "a set-point jumps": (_jump, "execute", ()),
-    "an unhealthy reading is believed": (
-        lambda: mock.patch.object(Stream, "_unhealthy", return_value=""),
-        "execute felt",
-        ("sensor_saturated",),
+    "a change of the box's bias is believed": (
+        lambda: mock.patch.object(box_watch, "changed", _nothing),
+        "record",
+        ("sensor_biased",),
     ),
-    "a silent sensor is believed": (
-        lambda: mock.patch.object(Stream, "listen", _nothing),
-        "execute felt",
-        ("sensor_silent",),
+    "an arm that may still move is code 3": (
+        lambda: mock.patch.object(UnconfirmedStopError, "exit_code", 3),
+        "execute file",
+        ("stop_fails", "frames_stop"),
+    ),
+    "what failed first is told last": (
+        lambda: mock.patch.object(stopping.StopOutcome, "error", _first),
+        "execute file",
+        ("stop_fails", "frames_stop"),
     ),
     "a failed run is thrown away": (_lost, "execute", ("estop",)),
     "a failure is not raised": (

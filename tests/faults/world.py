@@ -3,6 +3,13 @@
 import heapq
 from collections.abc import Callable
 
+LONGEST = 120.0
+"""s that a command may take; one that takes longer would never end."""
+
+
+class EndlessError(Exception):
+    """The world has come to its end, and the command has not."""
+
 
 class World:
     """A clock whose sleepers are overtaken by events; it never goes back.
@@ -15,6 +22,7 @@ class World:
 
     def __init__(self, start: float = 100.0) -> None:
         self._now = start
+        self._latest = start + LONGEST
         self._number = 0
         self._events: list[tuple[float, int, Callable[[], None]]] = []
         self.lateness: Callable[[float], float] = lambda _: 0.0
@@ -52,7 +60,14 @@ class World:
         self.advance(self._now + duration)
 
     def advance(self, t: float) -> None:
-        """Let everything happen up to `t`, s."""
+        """Let everything happen up to `t`, s.
+
+        Raises
+        ------
+        EndlessError
+        """
+        if t > self._latest:
+            raise EndlessError(f"not ended after {LONGEST:g} s of simulated time")
         while self._events and self._events[0][0] <= t:
             self._now, _, event = heapq.heappop(self._events)
             event()
@@ -61,7 +76,7 @@ class World:
     def wait(self, done: Callable[[], object], until: float) -> bool:
         """Let the world go on until `done` is true; False where it is not by `until`, s."""
         while not done():
-            if not self._events or self._events[0][0] > until:
+            if not self._events or self._events[0][0] > min(until, self._latest):
                 self.advance(until)
                 return bool(done())
             self.advance(self._events[0][0])
