@@ -19,6 +19,9 @@ MAGIC = b"PAR1"
 _NUMBER, _TEXT = 8, 64
 """Bytes of memory that a value takes at least; a text as an object of Python."""
 
+_ROWS = 4096
+"""Rows of lists that are read at once."""
+
 _FAULTS = (pa.ArrowException, OSError, ValueError, MemoryError)
 
 
@@ -89,7 +92,8 @@ def table(source: Source) -> Any:
             found = _plain(source, file.read(columns=flat))
             for name in names if len(flat) < len(names) else ():
                 if name not in flat:
-                    found = found.append_column(name, pa.nulls(found.num_rows))
+                    values = _lists(source, file, name) or pa.nulls(found.num_rows)
+                    found = found.append_column(name, values)
             return found
     except InputError as error:
         if isinstance(error.__cause__, _FAULTS):
@@ -126,6 +130,27 @@ def judge(name: str, file: Any, size: int, groups: Sequence[int] | None = None) 
                 raise ValueError("a row group of less than no rows")
             taken += width * group.num_rows
         untrusted.judge_table(name, taken, size)
+
+
+def _lists(source: Source, file: Any, name: str) -> Any:
+    """Return a column of lists of numbers, read a few rows at a time; None for other nested ones.
+
+    How long the lists are shows only as they are read.
+    """
+    kind = file.schema_arrow.field(name).type
+    lists = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
+    if not any(is_one(kind) for is_one in lists) or not _is_number(kind.value_type):
+        return None
+    chunks, taken = [], 0
+    for batch in file.iter_batches(batch_size=_ROWS, columns=[name]):
+        chunks.append(batch.column(0))
+        taken += batch.nbytes
+        untrusted.judge_table(source.name, taken, len(source.content))
+    return pa.chunked_array(chunks, kind)
+
+
+def _is_number(kind: Any) -> bool:
+    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
 def _width(kind: Any) -> int:

@@ -49,8 +49,8 @@ def quick(monkeypatch):
     from dmpcli.instruments import clock
 
     monkeypatch.setattr(clock, "MonotonicClock", clock.SimulatedClock)
-    for module in ("record", "execute"):
-        monkeypatch.setattr(f"dmpcli.workflows.{module}.watched", lambda robot: robot)
+    for module in ("control.watchdog", "workflows.record"):
+        monkeypatch.setattr(f"dmpcli.{module}.watched", lambda robot: robot)
     monkeypatch.setattr("dmpcli.records.journal.Journal._keep", lambda _: None)
 
 
