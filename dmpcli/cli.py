@@ -8,8 +8,8 @@ import sys
 from typing import Annotated, Any
 
 import typer
-from click import ClickException
 from typer.core import TyperCommand, TyperGroup
+from typer.exceptions import TyperException
 
 from dmpcli.commands.pose_arguments import joined
 from dmpcli.errors import DmpError, UnconfirmedStopError, printable
@@ -79,8 +79,8 @@ class Group(TyperGroup):
         """Parse the words after the program's name; poses of six words become one value."""
         try:
             return super().parse_args(ctx, joined(args))
-        except ClickException as error:
-            error.message = printable(error.message)  # type: ignore[misc]
+        except TyperException as error:
+            error.message = printable(error.message)
             raise
 
     def invoke(self, ctx: Any) -> Any:
@@ -91,8 +91,8 @@ class Group(TyperGroup):
             _show_defect(error)
             say(f"dmpcli: {error}")
             sys.exit(error.exit_code)
-        except ClickException as error:
-            error.message = printable(error.message)  # type: ignore[misc]
+        except TyperException as error:
+            error.message = printable(error.message)
             raise
         except BrokenPipeError:
             sys.exit(128 + signal.SIGPIPE)
