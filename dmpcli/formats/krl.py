@@ -9,9 +9,9 @@ import re
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.formats import program_moves
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_moves import BEGIN, END, NUMBER, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
     GRAVITY,
@@ -131,13 +131,20 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
     return lines
 
 
-_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_N = NUMBER
 _LIN = re.compile(r"LIN\s*\{([^}]*)\}\s*(C_DIS|C_VEL|C_ORI)?", re.ASCII | re.IGNORECASE)
 _ENTRY = re.compile(rf"\s*([A-Z]\d?)\s+({_N})\s*", re.ASCII | re.IGNORECASE)
 _VALUE = re.compile(rf"\$VEL\.(CP|ORI1|ORI2)\s*=\s*({_N})", re.ASCII | re.IGNORECASE)
 _WAIT = re.compile(rf"WAIT\s+SEC\s+({_N})", re.ASCII | re.IGNORECASE)
+_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)\s*\(\s*\)", re.ASCII | re.IGNORECASE)
+_CALL = re.compile(r"(\w+)\s*\(\s*\)", re.ASCII)
+_BASE = re.compile(r"\$BASE\s*=\s*(.+)|BAS\s*\(\s*#BASE\s*,(.+)\)", re.ASCII | re.IGNORECASE)
+_IS_ROOT = re.compile(
+    r"\$ROBROOT|\$NULLFRAME|\{\s*[XYZABC]\s+0(\.0*)?(\s*,\s*[XYZABC]\s+0(\.0*)?)*\s*\}|0",
+    re.ASCII | re.IGNORECASE,
+)
 _HARMLESS = re.compile(
-    r"(&.*|(GLOBAL\s+)?DEF\s+\w+\s*\(\s*\)|END|\w+\s*\(\s*\)|BAS\s*\(.*\)|PTP\s+\$AXIS_ACT|"
+    r"(&.*|END|BAS\s*\(.*\)|PTP\s+\$AXIS_ACT|"
     r"PTP\s+\$POS_ACT|\$[\w.\[\]]+\s*=.*|(DECL|INT|REAL|BOOL)\s.*)",
     re.ASCII | re.IGNORECASE,
 )
@@ -155,11 +162,17 @@ def decode(source: Source) -> list[MotionStroke]:
     """
     moves = ProgramMoves(source.name)
     speed, turn = float("nan"), float("nan")
-    for line, text in enumerate(program_moves.lines_of(source), 1):
-        code, _, comment = text.partition(";")
-        code = code.strip()
-        if comment:
-            moves.mark(comment)
+    routines = Routines(source.name, "", frozenset())
+    for line, code in moves.statements(source, ";"):
+        begun, called, base = _DEF.fullmatch(code), _CALL.fullmatch(code), _BASE.fullmatch(code)
+        if begun:
+            routines.begin(line, begun[1])
+        elif code.upper() == "END":
+            routines.end()
+        elif called:
+            routines.call(line, called[1])
+        elif base and not _IS_ROOT.fullmatch(base[1] or base[2]):
+            moves.in_frame(line, f"$BASE {base[1] or base[2]}")
         value, wait, found = _VALUE.fullmatch(code), _WAIT.fullmatch(code), _LIN.fullmatch(code)
         if value:
             if value[1].upper() == "CP":
@@ -170,12 +183,14 @@ def decode(source: Source) -> list[MotionStroke]:
             moves.wait(line, float(wait[1]))
         elif found:
             moves.move(line, _target(moves, line, found[1]), speed, turn)
-        elif code and not _HARMLESS.fullmatch(code):
+            routines.moved()
+        elif not (begun or called or base) and not _HARMLESS.fullmatch(code):
             raise moves.wrong(
                 line,
                 f"{code[:60]!r} is not read: only LIN to frames of numbers, WAIT SEC, speeds, and "
                 "routines in the order in which they are called",
             )
+    routines.check()
     return moves.strokes(_poses)
 
 

@@ -6,7 +6,7 @@ it begins where the move before the mark has led. A program without marks is one
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import MotionStroke
+from dmpcli.messages import warn
 from dmpcli.records.file_io import Source
 from dmpcli.spatial.rotations import log
 
@@ -21,6 +22,9 @@ Poses = Callable[[Floats], tuple[Floats, Floats | None]]
 """From the numbers of a program's targets, shape (n, k), to positions, mm, and rotations."""
 
 BEGIN, END = "stroke", "end of stroke"
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+"""A number as these languages write it, as a pattern."""
 
 MOST_MOVES = 5_000_000
 
@@ -40,6 +44,8 @@ class ProgramMoves:
         mm/s, rad/s and s; NaN where it is not said.
     marks : list of (int, str or None)
         Before which move a stroke begins, or None: ends.
+    frame : (int, str) or None
+        The first line that names another frame than the robot's base, and the frame.
     """
 
     name: str
@@ -49,6 +55,32 @@ class ProgramMoves:
     turn: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     marks: list[tuple[int, str | None]] = field(default_factory=list)
+    frame: tuple[int, str] | None = None
+
+    def statements(self, source: Source, comment: str) -> Iterator[tuple[int, str]]:
+        """Yield line number and code of each line that holds any; comments are taken as marks.
+
+        Parameters
+        ----------
+        source : Source
+        comment : str
+            What a comment begins with.
+
+        Raises
+        ------
+        InputError
+            It is not text.
+        """
+        for line, text in enumerate(lines_of(source), 1):
+            code, _, said = text.partition(comment)
+            if said:
+                self.mark(said)
+            if code := code.strip():
+                yield line, code
+
+    def in_frame(self, line: int, frame: str) -> None:
+        """Remember that positions are in a frame that is not the robot's base."""
+        self.frame = self.frame or (line, frame)
 
     def move(
         self,
@@ -100,6 +132,12 @@ class ProgramMoves:
         """
         if len(self.targets) < 2:
             raise InputError(f"{self.name}: holds no moves that could be a stroke")
+        if self.frame is not None:
+            line, frame = self.frame
+            warn(
+                f"{self.name}: line {line}: positions are in {frame}, and are taken as they stand; "
+                "in the robot's base they lie elsewhere"
+            )
         position, rotation = poses(np.array(self.targets, dtype=float))
         seconds = self._seconds(position, rotation)
         found = []

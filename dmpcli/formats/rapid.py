@@ -10,9 +10,9 @@ import re
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.formats import program_moves
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_moves import BEGIN, END, NUMBER, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
     GRAVITY,
@@ -99,7 +99,7 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
     return [f"  PERS tooldata tStroke := [TRUE,[[{place}],[{turn}]],{load}];"]
 
 
-_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_N = NUMBER
 _LIST = re.compile(_N, re.ASCII)
 _MOVE = re.compile(
     rf"MoveL\s+\[\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]\s*,[^;]*?\]\s*\]\s*,\s*"
@@ -107,9 +107,12 @@ _MOVE = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 _WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.ASCII | re.IGNORECASE)
+_PROC = re.compile(r"(?:LOCAL\s+)?PROC\s+(\w+)\s*\(\s*\)", re.ASCII | re.IGNORECASE)
+_CALL = re.compile(r"(\w+)\s*;", re.ASCII)
+_MOVES_NOTHING = frozenset({"stop", "break", "tperase"})
+_WOBJ = re.compile(r"\\WObj\s*:=\s*(\w+)", re.ASCII | re.IGNORECASE)
 _HARMLESS = re.compile(
-    r"(MODULE\s+\w+.*|ENDMODULE|(LOCAL\s+)?PROC\s+\w+\s*\(\s*\)|ENDPROC|"
-    r"(LOCAL\s+)?(PERS|CONST|VAR|TASK)\s.*;|\w+\s*;|(ConfL|ConfJ|SingArea|AccSet)\b.*;|"
+    r"(MODULE\s+\w+.*|ENDMODULE|ENDPROC|(LOCAL\s+)?(PERS|CONST|VAR|TASK)\s.*;|(ConfL|ConfJ|SingArea|AccSet)\b.*;|"
     r"\w+\s*:=\s*CTool\s*\(\s*\)\s*;|%%%|VERSION:.*|LANGUAGE:.*)",
     re.ASCII | re.IGNORECASE,
 )
@@ -125,11 +128,15 @@ def decode(source: Source) -> list[MotionStroke]:
         It holds what is neither a straight move to a target nor harmless; names the line.
     """
     moves = ProgramMoves(source.name)
-    for line, text in enumerate(program_moves.lines_of(source), 1):
-        code, _, comment = text.partition("!")
-        code = code.strip()
-        if comment:
-            moves.mark(comment)
+    routines = Routines(source.name, "main", _MOVES_NOTHING)
+    for line, code in moves.statements(source, "!"):
+        begun, called = _PROC.fullmatch(code), _CALL.fullmatch(code)
+        if begun:
+            routines.begin(line, begun[1])
+        elif code.upper() == "ENDPROC":
+            routines.end()
+        elif called:
+            routines.call(line, called[1])
         wait, found = _WAIT.fullmatch(code), None
         if code[:5].lower() == "movel":
             found = _MOVE.fullmatch(code)
@@ -137,17 +144,22 @@ def decode(source: Source) -> list[MotionStroke]:
             moves.wait(line, float(wait[1]))
         elif found:
             _move(moves, line, found)
-        elif code and not _HARMLESS.fullmatch(code):
+            routines.moved()
+        elif not (begun or called) and not _HARMLESS.fullmatch(code):
             raise moves.wrong(
                 line,
                 f"{code[:60]!r} is not read: only MoveL to robtargets of numbers, WaitTime, and "
                 "procedures in the order in which they are called",
             )
+    routines.check()
     return moves.strokes(_poses)
 
 
 def _move(moves: ProgramMoves, line: int, found: re.Match[str]) -> None:
     place, turn = (_numbers(found[i]) for i in (1, 2))
+    frame = _WOBJ.search(found[0])
+    if frame is not None and frame[1].lower() != "wobj0":
+        moves.in_frame(line, f"work object {frame[1]}")
     if len(place) != 3 or len(turn) != 4:
         raise moves.wrong(line, "a robtarget needs 3 coordinates and 4 of a quaternion")
     bad = wrong("wxyz", np.array([turn]))

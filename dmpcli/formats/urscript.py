@@ -9,9 +9,9 @@ import re
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.formats import program_moves
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.formats.program_moves import BEGIN, END, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_moves import BEGIN, END, NUMBER, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
     GRAVITY,
@@ -92,14 +92,16 @@ def _tool(tool: Tool | None, payload: bool) -> list[str]:
     return lines
 
 
-_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_N = NUMBER
 _POSE = rf"p\s*\[\s*({_N}(?:\s*,\s*{_N}){{5}})\s*\]"
 _MOVE = re.compile(rf"(movel|movep)\s*\(\s*{_POSE}\s*((?:,[^)]*)?)\)", re.ASCII)
 _SLEEP = re.compile(rf"sleep\s*\(\s*({_N})\s*\)", re.ASCII)
 _SAID = re.compile(rf"\s*(?:([avtr])\s*=)?\s*({_N})\s*", re.ASCII)
+_DEF = re.compile(r"def\s+(\w+)\s*\(\s*\)\s*:", re.ASCII)
+_CALL = re.compile(r"(\w+)\s*\(\s*\)", re.ASCII)
+_MOVES_NOTHING = frozenset({"sync", "zero_ftsensor", "end_force_mode"})
 _HARMLESS = re.compile(
-    r"(def\s+\w+\s*\(\s*\)\s*:|end|\w+\s*\(\s*\)|"
-    r"(set_|textmsg|popup|sync|stopl|stopj)\w*\s*\(.*\)|global\s.*)",
+    r"(end|(set_|textmsg|popup|sync|stopl|stopj)\w*\s*\(.*\)|global\s.*)",
     re.ASCII,
 )
 
@@ -114,12 +116,16 @@ def decode(source: Source) -> list[MotionStroke]:
         It holds what is neither a straight move to a pose nor harmless; names the line.
     """
     moves = ProgramMoves(source.name)
-    for line, text in enumerate(program_moves.lines_of(source), 1):
-        code, _, comment = text.partition("#")
-        code = code.strip()
-        if comment:
-            moves.mark(comment)
-        if not code or _HARMLESS.fullmatch(code):
+    routines = Routines(source.name, "", _MOVES_NOTHING)
+    for line, code in moves.statements(source, "#"):
+        begun, called = _DEF.fullmatch(code), _CALL.fullmatch(code)
+        if begun:
+            routines.begin(line, begun[1])
+        elif code == "end":
+            routines.end()
+        elif called:
+            routines.call(line, called[1])
+        if begun or called or _HARMLESS.fullmatch(code):
             continue
         slept = _SLEEP.fullmatch(code)
         if slept:
@@ -142,6 +148,8 @@ def decode(source: Source) -> list[MotionStroke]:
         target = tuple(float(v) for v in found[2].split(","))
         speed = said.get("v", DEFAULT_SPEED / 1000.0) * 1000.0
         moves.move(line, target, **_how(speed, seconds))
+        routines.moved()
+    routines.check()
     return moves.strokes(_poses)
 
 
