@@ -19,7 +19,6 @@ from dmpcli.instruments import clock as clocks
 from dmpcli.instruments import sockets
 from dmpcli.instruments.elite import controller as elite_controller
 from dmpcli.instruments.elite import jsonrpc, monitor
-from dmpcli.instruments.elite.frames import SIZE
 from dmpcli.instruments.netft import box_watch, http_client, protocol
 from dmpcli.instruments.netft import driver as netft_driver
 from dmpcli.simulation.elite_server import lab as elite_lab
@@ -54,13 +53,10 @@ class LockStepMonitor(monitor.Monitor):
         self._socket = link
 
         def listen() -> None:
-            with mock.patch.object(self, "_closing", False):
-                content = bytes(link._inbox)
-                link._inbox.clear()
-                for report in self._frames.feed(content, self._clock.now()):
-                    self._take(report)
-                if link._cut:
-                    self._gone = "the controller closed the connection"
+            for report in self._frames.feed(link.drained(), self._clock.now()):
+                self._take(report)
+            if link.closed:
+                self._gone = "the controller closed the connection"
 
         link.heard = listen
         self._news: Any = SimulatedCondition(self.world)
@@ -190,6 +186,8 @@ class Bench:
         Called when the first set-point comes, or a plan is played.
     must_stop, must_stop_with_sensor : list of float
         s after that, from when on the arm must not draw on; with a sensor, or always.
+    must_heed : list of float
+        s after that, when signals came: one stops a stroke that has set-points left to be sent.
     entered, ended : float
         When the motion began, and when the last set-point came or the arm came to rest, s.
     """
@@ -215,6 +213,7 @@ class Bench:
         self.begun: list[Callable[[], None]] = []
         self.must_stop: list[float] = []
         self.must_stop_with_sensor: list[float] = []
+        self.must_heed: list[float] = []
         self.entered = self.ended = 0.0
 
     @contextmanager
@@ -300,6 +299,3 @@ class Bench:
         for name, port in (("robot", RPC_PORT), ("monitor", MONITOR_PORT)):
             if which in (name, "both"):
                 self.exchange.cut(port)
-
-
-assert SIZE == 1024

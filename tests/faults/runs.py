@@ -45,6 +45,8 @@ a long one, which a controller plays by itself, takes longer than an arm is watc
 ALLOWED = {0, 2, 3, 4, *(128 + n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))}
 # mm/s of the TCP: an arm at rest; and how long it may go on after the command, s.
 _REST, _AFTER = 0.5, 0.3
+# s for which other commands rest, lift or end by themselves.
+_ENDING = 0.15
 # What a person is told where the arm was not seen at rest.
 _UNSURE = "THE ARM MAY STILL MOVE"
 
@@ -292,6 +294,17 @@ def _steps(finding: Finding, bench: Bench) -> Iterator[str]:
         yield f"a set-point is {away:.2f} mm off the plan"
 
 
+def _left(finding: Finding, bench: Bench) -> float:
+    """Until when set-points were left to be sent, s after the first one: then a signal stops."""
+    if finding.command not in ("execute", "execute felt"):
+        # What is pressed leaves beside the plan; a controller plays by itself; a recording ends when
+        # its time is over.
+        return bench.ended - bench.entered - _ENDING
+    t, sent = _positions(bench)
+    there = np.linalg.norm(sent - _plan(finding.stroke)[-1], axis=1) < 1e-3
+    return float(t[int(np.argmax(there))]) - bench.entered - 0.02 if there.any() else np.inf
+
+
 @cache
 def _plan(name: str) -> Floats:
     kept = record.decode(file_io.read(str(folder() / f"{name}.parquet")), schemas.TRAJECTORY)
@@ -320,6 +333,9 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
     lasts = bench.ended - bench.entered if bench.ended else 0.0
     if any(after < lasts - 0.15 for after in stop):
         yield f"exit 0, and the arm had to stop {min(stop):.2f} s in, of {lasts:.2f}"
+    left = _left(finding, bench)
+    if any(after < left for after in bench.must_heed):
+        yield f"exit 0, and a signal came {min(bench.must_heed):.2f} s in, of {left:.2f}"
     if finding.command in ("record", "calibrate"):
         return
     kept = record.decode(file_io.read(str(output)), schemas.RUN)

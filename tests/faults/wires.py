@@ -62,6 +62,12 @@ class Connection:
             raise BlockingIOError(11, "Resource temporarily unavailable")
         raise TimeoutError("timed out")
 
+    def drained(self) -> bytes:
+        """Return what has arrived, without waiting."""
+        content = bytes(self._inbox)
+        self._inbox.clear()
+        return content
+
     def shutdown(self, _: int) -> None:
         """As of a socket."""
         self._closed = True
