@@ -11,6 +11,7 @@
 #   make lock        the lock files, from pyproject.toml
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
+#   make judges      the tests that programs of others judge, which make test does without
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make mutations   damaged and crafted inputs for every reader: what is not refused
@@ -39,7 +40,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers faults \
+.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers judges faults \
     soak mutations cluster-demo samples pictures schemas clean FORCE
 
 help:
@@ -117,6 +118,16 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
+
+# Programs of others that take long to install judge what export writes, in an environment of their own.
+
+JUDGES := $(OUT)/judges/venv
+
+judges:
+	@sh tools/set_up.sh "$(PYTHON)" "$(JUDGES)" "$(LOCK)" "$(OUT)"
+	$(JUDGES)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/judges.txt
+	DMPCLI_JUDGES=required $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
+	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py
 
 # One seed replays one failure: python -m tests.faults --seed N.
 SEEDS ?= 10000

@@ -297,8 +297,8 @@ def _steps(finding: Finding, bench: Bench) -> Iterator[str]:
 def _left(finding: Finding, bench: Bench) -> float:
     """Until when set-points were left to be sent, s after the first one: then a signal stops."""
     if finding.command not in ("execute", "execute felt"):
-        # What is pressed leaves beside the plan; a controller plays by itself; a recording ends when
-        # its time is over.
+        # What is pressed leaves beside the plan; a controller plays by itself; a recording ends
+        # when its time is over.
         return bench.ended - bench.entered - _ENDING
     t, sent = _positions(bench)
     there = np.linalg.norm(sent - _plan(finding.stroke)[-1], axis=1) < 1e-3
