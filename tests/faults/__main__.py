@@ -31,9 +31,8 @@ def main() -> int:
     begun, bad, codes, commands = time.perf_counter(), 0, Counter[int](), Counter[str]()
     seeds = range(given.first, given.first + given.seeds)
     # What libraries keep for each call adds up: a process ends after some hundreds of runs.
-    fresh = {"mp_context": get_context("spawn"), "max_tasks_per_child": 20}
-    with ProcessPoolExecutor(given.jobs, **fresh) as pool:
-        for found in pool.map(run, seeds, chunksize=25):
+    with get_context("spawn").Pool(given.jobs, maxtasksperchild=20) as pool:
+        for found in pool.imap(run, seeds, chunksize=25):
             codes[found.code] += 1
             commands[found.command] += 1
             if found.wrong:

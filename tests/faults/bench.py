@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib import metadata
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeAlias
 from unittest import mock
 
 import numpy as np
@@ -40,6 +40,9 @@ RPC_PORT, MONITOR_PORT = 8055, 8056
 _INSTALLED = metadata.entry_points()
 SOURCE = ("127.0.0.1", 49152)
 STRANGER = ("127.0.0.1", 49999)
+
+Wire: TypeAlias = Callable[[bytes], list[tuple[bytes, float]]]
+"""From bytes that are sent to what arrives of them, and how much later, s."""
 
 
 class LockStepMonitor(monitor.Monitor):
@@ -77,17 +80,26 @@ class LockStepWatch(box_watch.BoxWatch):
     def __init__(self, pages: Any, before: Any, every: float) -> None:
         self._pages, self._before = pages, before
         self.fault = None
-        self._ending = threading.Event()
+        self._ending, self._asked = threading.Event(), threading.Event()
         self._thread: Any = SimpleNamespace(join=lambda _: None)
+        self._rests = self.world.now()
 
-        def look() -> bool:
-            if self.fault is None and not self._ending.is_set():
-                self.aside.add("watch")
-                self._look()
-                self.aside.discard("watch")
-            return self.fault is None and not self._ending.is_set()
+        self.world.every(every, self._turn)
 
-        self.world.every(every, look)
+    def look_soon(self) -> None:
+        """As of a `BoxWatch`."""
+        if not self._asked.is_set():
+            self._asked.set()
+            self.world.at(max(self._rests, self.world.now() + 2e-3), self._turn)
+
+    def _turn(self) -> bool:
+        self._asked.clear()
+        if self.fault is None and not self._ending.is_set():
+            self.aside.add("watch")
+            self._look()
+            self.aside.discard("watch")
+            self._rests = self.world.now() + box_watch.PAUSE
+        return self.fault is None and not self._ending.is_set()
 
 
 class SimulatedCondition:
@@ -204,8 +216,8 @@ class Bench:
         self.exchange = Exchange(self.world)
         self.exchange.services = {RPC_PORT: self._requests, MONITOR_PORT: self._frames}
         self.lab.drop = self._drop
-        self.reply: Callable[[bytes], list[tuple[bytes, float]]] = lambda r: [(r, 3e-4)]
-        self.frame: Callable[[bytes], list[tuple[bytes, float]]] = lambda f: [(f, 3e-4)]
+        self.reply: Wire = lambda r: [(r, 3e-4)]
+        self.frame: Wire = lambda f: [(f, 3e-4)]
         self.page: Callable[[bytes], tuple[bytes, float]] = lambda p: (p, 2e-3)
         self.answers: Callable[[str, dict[str, Any]], Any] = self.lab.call
         self.signal: Callable[[int], object] = lambda _: None

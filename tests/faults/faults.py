@@ -14,7 +14,7 @@ import numpy as np
 
 from dmpcli.instruments.elite.frames import FRAME
 from dmpcli.records import file_io, journal
-from tests.faults.bench import MONITOR_PORT, RPC_PORT, Bench
+from tests.faults.bench import MONITOR_PORT, RPC_PORT, Bench, Wire
 
 Rng: TypeAlias = np.random.Generator
 
@@ -58,24 +58,28 @@ def _when(bench: Bench, rng: Rng, event: Callable[[], None]) -> float:
     return after
 
 
-def _replies(bench: Bench, change: Callable[[bytes], list[tuple[bytes, float]] | None]) -> None:
-    before = bench.reply
+Change: TypeAlias = Callable[[bytes], list[tuple[bytes, float]] | None]
+"""From bytes on their way to what becomes of them, with delays, s; None where nothing does."""
 
-    def reply(content: bytes) -> list[tuple[bytes, float]]:
+
+def _composed(before: Wire, change: Change) -> Wire:
+    """Return what bytes become that one fault has had, and those before it."""
+
+    def wire(content: bytes) -> list[tuple[bytes, float]]:
         changed = change(content)
-        return before(content) if changed is None else changed
+        parts = [(content, 0.0)] if changed is None else changed
+        return [(last, late + delay) for part, late in parts for last, delay in before(part)]
 
-    bench.reply = reply
+    return wire
 
 
-def _frames(bench: Bench, change: Callable[[bytes], list[tuple[bytes, float]] | None]) -> None:
-    before = bench.frame
+def _replies(bench: Bench, change: Change) -> None:
+    bench.reply = _composed(bench.reply, change)
 
-    def frame(content: bytes) -> list[tuple[bytes, float]]:
-        changed = change(content)
-        return before(content) if changed is None else changed
 
-    bench.frame = frame
+def _frames(bench: Bench, change: Change) -> None:
+    # What another fault has cut is no frame any more.
+    bench.frame = _composed(bench.frame, lambda f: change(f) if len(f) == FRAME.itemsize else None)
 
 
 def _once(bench: Bench, rng: Rng) -> tuple[Callable[[], bool], float]:

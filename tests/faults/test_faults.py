@@ -54,3 +54,9 @@ def test_events_happen_in_order_and_sleepers_are_overtaken():
     assert world.now() == 1.5
     assert not world.wait(lambda: len(seen) > 3, 3.0)
     assert (seen[-1], world.now()) == (("b", 2.0), 3.0)
+
+
+def test_a_bias_that_somebody_sets_moves_the_arm_no_further_than_15_mm_whatever_its_size():
+    hold_all = [run(seed, ("sensor_biased",), "record") for seed in range(24)]
+    assert not [told(finding) for finding in hold_all if finding.wrong]
+    assert {finding.code for finding in hold_all} == {4}

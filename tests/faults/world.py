@@ -24,7 +24,7 @@ class World:
         self._now = start
         self._latest = start + LONGEST
         self._number = 0
-        self._events: list[tuple[float, int, Callable[[], None]]] = []
+        self._events: list[tuple[float, int, Callable[[], object]]] = []
         self.lateness: Callable[[float], float] = lambda _: 0.0
 
     def now(self) -> float:
@@ -37,7 +37,7 @@ class World:
         """Return the time as ns since an epoch, as `time.time_ns` does."""
         return 1_700_000_000_000_000_000 + round(self._now * 1e9)
 
-    def at(self, t: float, event: Callable[[], None]) -> None:
+    def at(self, t: float, event: Callable[[], object]) -> None:
         """Have something happen at time `t`, s, or at once where that has passed."""
         self._number += 1
         heapq.heappush(self._events, (max(t, self._now), self._number, event))

@@ -2,7 +2,8 @@
 
 A counter that goes on and a sound status tell nothing of these: somebody presses "Bias" on the
 box's page, or another configuration is made active, and all forces are others from then on. They
-are read and compared, and never written: a tool file's zero holds for the box's own bias.
+are read and compared, and never written: a tool file's zero holds for the box's own bias. How far
+an arm is led meanwhile grows with the force, so a look is due at once where the force has leapt.
 """
 
 import threading
@@ -12,6 +13,9 @@ from dmpcli.instruments.netft.settings import BoxInfo
 
 _PATIENCE = 1.0
 """s for one look."""
+
+PAUSE = 0.1
+"""s from one look to the next at least, however often it is asked for: a box serves few."""
 
 
 class BoxWatch:
@@ -34,7 +38,7 @@ class BoxWatch:
     def __init__(self, pages: Box, before: BoxInfo, every: float) -> None:
         self._pages, self._before, self._every = pages, before, every
         self.fault: str | None = None
-        self._ending = threading.Event()
+        self._ending, self._asked = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._watch, name="box watch", daemon=True)
         self._thread.start()
 
@@ -43,13 +47,24 @@ class BoxWatch:
         if self._ending.is_set():
             return
         self._ending.set()
+        self._asked.set()
         self._thread.join(2.0 * _PATIENCE)
         if self.fault is None:
             self._look()
 
+    def look_soon(self) -> None:
+        """Have the thread look without waiting for its time; returns at once."""
+        self._asked.set()
+
     def _watch(self) -> None:
-        while self.fault is None and not self._ending.wait(self._every):
+        while self.fault is None:
+            self._asked.wait(self._every)
+            self._asked.clear()
+            if self._ending.is_set():
+                return
             self._look()
+            if self._ending.wait(PAUSE):
+                return
 
     def _look(self) -> None:
         # A page that does not answer says nothing: its server is slow at times, and the stream,

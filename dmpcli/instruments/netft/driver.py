@@ -167,7 +167,10 @@ class NetFtSensor:
         samples = stream.take(letters)
         stream.listen(self._clock.now())
         if stream.fault is None and self._watch is not None:
+            if stream.leapt:
+                self._watch.look_soon()
             stream.fault = self._watch.fault
+        stream.leapt = False
         unhealthy = bool(samples) and not samples[-1].healthy  # tells its fault itself
         if stream.fault is not None and not unhealthy:
             raise self._failed(f"{stream.fault}, stopped")

@@ -27,6 +27,10 @@ ONE_LOST = 2.5
 MALFORMED = 10
 """So many senseless datagrams in a row are a fault."""
 
+LEAP = 1.0
+"""N from one reading to the next, beyond which it is asked whether the box was set otherwise."""
+
+_LEAP = np.full(3, LEAP)
 _AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -76,6 +80,9 @@ class Stream:
     tally : LossCounter
     fault : str or None
         What is wrong; final.
+    leapt : bool
+        Whether the force has leapt from one reading to the next, as it does where somebody sets a
+        bias; whoever looks into it sets it back.
     """
 
     source: tuple[str, int]
@@ -88,6 +95,8 @@ class Stream:
     sequence: Sequence = field(init=False)
     tally: LossCounter = field(default_factory=LossCounter)
     fault: str | None = None
+    leapt: bool = False
+    _force: Floats | None = None
     _newest: float = -math.inf
     _senseless: int = 0
     _dropped: str = ""
@@ -170,6 +179,9 @@ class Stream:
                     self.fault = f"sample {rdt_sequence}: {reason}"
                 else:
                     self._compare(np.asarray(counts).tobytes())
+                    before, self._force = self._force, wrench[:3]
+                    if before is not None and not within(wrench[:3] - before, _LEAP):
+                        self.leapt = True
             elif verdict is Verdict.BACKWARD:
                 self.fault = f"record {rdt_sequence}: {verdict.value}"
             elif verdict is Verdict.JUMP:
