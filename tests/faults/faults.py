@@ -287,11 +287,19 @@ def frame_nan(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
 
 @_kind
 def frame_flag(bench: Bench, rng: Rng, wrong: Wrong, _: ExitStack) -> None:
-    """An emergency stop or a collision that is shown in a single frame."""
+    """An emergency stop or a collision that is shown in a single frame, of those that arrive."""
     now, after = _once(bench, rng)
-    name = str(rng.choice(["estop", "collision"]))
-    _frames(bench, lambda f: [(_changed(f, **{name: 1}), 3e-4)] if now() else None)
-    bench.must_stop.append(after)
+    name, before = str(rng.choice(["estop", "collision"])), bench.frame
+
+    def flagged(frame: bytes) -> list[tuple[bytes, float]]:
+        parts = before(frame)
+        for i, (part, delay) in enumerate(parts):
+            if len(part) == FRAME.itemsize and now():
+                parts[i] = (_changed(part, **{name: 1}), delay)
+                bench.must_stop.append(bench.world.now() + delay - bench.entered)
+        return parts
+
+    bench.frame = flagged
     wrong.words.append(f"a single frame shows {name}, {after:.2f} s in")
 
 
