@@ -2,8 +2,10 @@
 
 import functools
 import gc
+import signal
 import sys
 
+import pytest
 import typer.testing
 from hypothesis import settings
 
@@ -17,6 +19,20 @@ FIRST = ("tests/pipeline", "tests/tools")
 
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
+
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+
+
+@pytest.fixture(autouse=True)
+def handlers_of_signals_are_put_back():
+    """A test that leaves a signal ignored or counted fails itself, not the next one."""
+    before = [signal.getsignal(number) for number in SIGNALS]
+    yield
+    after = [signal.getsignal(number) for number in SIGNALS]
+    for number, handler in zip(SIGNALS, before, strict=True):
+        signal.signal(number, handler)
+    assert after == before
 
 
 def pytest_unconfigure():

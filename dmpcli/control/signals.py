@@ -45,7 +45,8 @@ class Interruption:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        for number, handler in self._before.items():
+        # SIGINT last: its usual handler may raise at once, and none may be left as it was here.
+        for number, handler in reversed(self._before.items()):
             signal.signal(number, handler)
 
     def receive(self, number: int, frame: FrameType | None = None) -> None:  # noqa: ARG002

@@ -11,7 +11,8 @@ COUNTED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 @pytest.fixture(autouse=True)
 def usual():
     """Handlers as a shell leaves them; nohup and the background hand down others."""
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    usual = dict.fromkeys((*COUNTED, signal.SIGTSTP), signal.SIG_DFL)
+    usual[signal.SIGINT] = signal.default_int_handler
     before = {number: signal.signal(number, handler) for number, handler in usual.items()}
     yield
     for number, handler in before.items():
@@ -60,6 +61,21 @@ def test_handlers_are_put_back():
     before = handlers()
     with Interruption():
         assert all(now != then for now, then in zip(handlers(), before, strict=True))
+    assert handlers() == before
+
+
+def test_a_signal_that_ends_the_program_as_handlers_are_put_back_leaves_none_behind(monkeypatch):
+    before = handlers()
+    put = signal.signal
+
+    def raising(number, handler):
+        put(number, handler)
+        if number == signal.SIGINT and handler is signal.default_int_handler:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), Interruption():
+        monkeypatch.setattr(signal, "signal", raising)
+    monkeypatch.undo()
     assert handlers() == before
 
 
