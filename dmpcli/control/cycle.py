@@ -35,11 +35,26 @@ Pose = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class ReadyArm:
-    """A robot that stands ready, and the clock it runs on."""
+    """A robot that stands ready, and the clock it runs on.
+
+    Attributes
+    ----------
+    servo : Servo
+    info : ServoInfo
+    clock : Clock
+    joints : int
+        How many joint angles its states tell; 0 where none.
+    """
 
     servo: Servo
     info: ServoInfo
     clock: Clock
+    joints: int = 0
+
+    def as_told(self) -> "ReadyArm":
+        """Return the arm with as many joints as its state tells now."""
+        told = self.servo.state().joints
+        return replace(self, joints=0 if told is None else len(told))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION, WRENCH, suffixed
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -36,6 +36,8 @@ class Row:
     state, phase : str
     id : str or None
         The stroke that the set-point lies on; None on the way to, from and between strokes.
+    joints : array, shape (n,), or None
+        Actual, rad.
     """
 
     t: float
@@ -50,6 +52,7 @@ class Row:
     state: str
     phase: str
     id: str | None = None
+    joints: Floats | None = None
 
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
@@ -65,6 +68,8 @@ class RunLog:
         Whether the trajectory states an orientation; without one the planned angles are absent.
     sensed, coupled : bool
         Whether there is a sensor, and a force coupling.
+    joints : int
+        How many joint angles the arm tells; 0 where none.
 
     Attributes
     ----------
@@ -72,12 +77,20 @@ class RunLog:
         ``clock`` is the loop's clock, which no file keeps.
     """
 
-    def __init__(self, oriented: bool = True, sensed: bool = False, coupled: bool = False) -> None:
+    def __init__(
+        self,
+        oriented: bool = True,
+        sensed: bool = False,
+        coupled: bool = False,
+        joints: int = 0,
+    ) -> None:
         groups = dict.fromkeys(("clock", *_TIMES), 1)
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
         groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
+        self._joints = joints if joints <= len(JOINTS) else 0
+        groups |= {"joints": self._joints} if self._joints else {}
         self.rows = RowBuffer(groups, ("state", "phase", "id"))
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
@@ -99,6 +112,9 @@ class RunLog:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
             felt += (row.coupling,)
+        if self._joints:
+            told = row.joints is not None and len(row.joints) == self._joints
+            felt += (row.joints if told and row.joints is not None else np.nan,)
         times = (row.t, row.t_plan, row.deadline, row.lateness)
         self.rows.add(
             (clock, *times, *planned, *row.sent, *row.actual, *felt),
@@ -128,6 +144,9 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out |= _split(rows.numbers("wrench"), WRENCH, "")
     if "coupling" in rows.groups:
         out["coupling"] = rows.numbers("coupling")
+    if "joints" in rows.groups:
+        angles = rows.numbers("joints").reshape(len(rows), -1)
+        out |= dict(zip(JOINTS, angles.T, strict=False))
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
     return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
 

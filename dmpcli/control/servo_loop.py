@@ -96,7 +96,8 @@ class PlanLoop(ControlLoop):
             )
         self._touch, self._limits = touch, limits
         self._draw(plan)
-        self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
+        sensed, pressed = touch is not None, self.pressing is not None
+        self.log = RunLog(plan.oriented, sensed, pressed, arm.joints)
 
     def run(self, interruption: Interruption) -> LoopOutcome:
         """Go on until the arm rests at the end, or a reason to stop; the arm is stopped after.
@@ -227,6 +228,7 @@ class PlanLoop(ControlLoop):
                 state=state.mode,
                 phase=self._cursor.phase,
                 id=self.plan.id if draws else None,
+                joints=state.joints,
             ),
         )
 

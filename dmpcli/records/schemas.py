@@ -40,6 +40,8 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6", "q7")
+"""Of an arm with fewer joints the first ones; no arm with more is logged."""
 
 
 def suffixed(names: tuple[str, ...], suffix: str) -> tuple[str, ...]:
@@ -109,7 +111,8 @@ RUN = Schema(
         "state": Column("1", "robot state", "string"),
         "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
         "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),
-    },
+    }
+    | {n: Column("rad", "actual joint angle", required=False) for n in JOINTS},
 )
 
 PAIRS = Schema(

@@ -181,7 +181,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
     try:
-        arm = ReadyArm(robot, robot.open(), clock)
+        arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
@@ -197,7 +197,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
         provenance.facts.update(execution.facts_of(arm, coupling, settings))
-        outcome, made = _stream(loop, provenance, realtime, keeper)
+        outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close, lock.release)
     with stopping.outranking(lambda: outcome.stop):
@@ -332,7 +332,11 @@ def _provenance(
 
 
 def _stream(
-    loop: PlanLoop, provenance: Provenance, realtime: bool, keeper: RunOutput
+    loop: PlanLoop,
+    provenance: Provenance,
+    realtime: bool,
+    keeper: RunOutput,
+    reach: Reach | None,
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
@@ -344,7 +348,7 @@ def _stream(
             outcome = loop.run(interruption)
         finally:
             if len(loop.log):
-                made = execution.record_of(loop, outcome, provenance, realtime)
+                made = execution.record_of(loop, outcome, provenance, realtime, reach)
                 keeper.keep(made, outcome.error())
             else:
                 keeper.drop()

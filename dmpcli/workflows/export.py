@@ -47,8 +47,6 @@ def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> 
     if alone:
         flag = f"--{alone[0].replace('_', '-')}"
         raise InputError(f"{flag}: says nothing of {chosen.word}; leave it out")
-    if chosen.word == "joints" and options.robot_model is None:
-        raise InputError("--format joints: of which arm? Name it, as in --robot-model ec66")
     if chosen.folder:
         file_io.check_folder(output)
     elif ID not in Path(output).name:
@@ -102,12 +100,38 @@ def _prepared(motion: Motion, chosen: FileFormat, options: ExportOptions) -> Mot
     if rate is not None:
         motion = motions.evenly(motion, rate)
     if chosen.word == "joints":
-        from dmpcli.formats.joint_table import with_joints
-
-        assert options.robot_model is not None
-        held = None if options.tool is None else tool.geometry(file_io.read(options.tool))
-        motion = with_joints(motion, models.model(options.robot_model), held)
+        motion = _in_joints(motion, options)
     return motion
+
+
+def _in_joints(motion: Motion, options: ExportOptions) -> Motion:
+    """Return the motion with joint angles: those of the file, else by kinematics.
+
+    Raises
+    ------
+    InputError, RefusedError
+        Of no arm, of another one than the file's, or of one that cannot follow.
+    """
+    model, said = options.robot_model, motion.facts.get("joints")
+    if all(one.joints is not None for one in motion.strokes):
+        arm = said.get("arm") if isinstance(said, dict) else None
+        if model is not None and arm is not None and model != arm:
+            raise InputError(f"--robot-model {model}: {motion.name} holds the joints of an {arm}")
+        if options.tool is not None:
+            raise InputError(f"--tool: {motion.name} holds the joints themselves; leave it out")
+        measured = not isinstance(said, dict) or said.get("measured", True)
+        how = "as its controller told them" if measured else "by kinematics, no robot told them"
+        tell(f"{motion.name}: joint angles of the arm on its way, {how}")
+        return motion
+    if model is None:
+        raise InputError(
+            f"--format joints: {motion.name} holds no joint angles; of which arm are they to be? "
+            "Name it, as in --robot-model ec66"
+        )
+    from dmpcli.formats.joint_table import with_joints
+
+    held = None if options.tool is None else tool.geometry(file_io.read(options.tool))
+    return with_joints(motion, models.model(model), held)
 
 
 def _write(motion: Motion, output: str | Path, chosen: FileFormat, options: ExportOptions) -> None:

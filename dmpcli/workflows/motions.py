@@ -12,7 +12,7 @@ from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.record import Record
-from dmpcli.records.schemas import EULER_ANGLES, NORMAL, WRENCH
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, NORMAL, WRENCH
 from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.reporting import tracking
 from dmpcli.spatial.rotations import from_euler, interpolate
@@ -106,7 +106,7 @@ def run_strokes(run: Record) -> list[MotionStroke]:
         forward = np.concatenate([[True], np.diff(np.maximum.accumulate(t)) > 0.0])
         if forward.sum() < 2:
             continue
-        R, wrench = drawn.rotation(), _wrench(drawn)
+        R, wrench, joints = drawn.rotation(), _wrench(drawn), _joints(drawn)
         strokes.append(
             MotionStroke(
                 t[forward],
@@ -114,6 +114,7 @@ def run_strokes(run: Record) -> list[MotionStroke]:
                 None if R is None else R[forward],
                 id=name,
                 wrench=None if wrench is None else wrench[forward],
+                joints=None if joints is None else joints[forward],
             )
         )
     if not strokes:
@@ -126,6 +127,13 @@ def _wrench(found: Record) -> Floats | None:
     if not found.has(*WRENCH):
         return None
     values = found.stack(WRENCH)
+    return None if np.isnan(values).any() else values
+
+
+def _joints(found: Record) -> Floats | None:
+    """Joint angles of each row, shape (n, J), rad; None where they are not known throughout."""
+    names = [name for name in JOINTS if name in found.columns]
+    values = found.stack(names) if names else np.full((1, 1), np.nan)
     return None if np.isnan(values).any() else values
 
 

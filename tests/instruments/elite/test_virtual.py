@@ -13,6 +13,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import MonotonicClock
+from dmpcli.kinematics import chain, models
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import PlannedStroke, make
 from dmpcli.simulation.elite_server import faults
@@ -51,7 +52,7 @@ class Bench:
         stroke = PlannedStroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
         here = (state.position, state.rotation)
         plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
-        arm = ReadyArm(self.servo, info, self.clock)
+        arm = ReadyArm(self.servo, info, self.clock).as_told()
         return kind(plan, LIMITS, StopLimits(5.0, 0.1, 50.0, 5.0), arm), way
 
     def close(self):
@@ -97,6 +98,10 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     assert gaps.max() < 0.3
     assert len(actual) > 40
     assert set(columns["state"]) == {"ready"}
+    # The joints of each row are those that its pose was made of.
+    joints = np.column_stack([columns[f"q{i}"] for i in range(1, 7)])
+    flange, turned = chain.forward(models.model("ec66"), joints)
+    np.testing.assert_allclose(flange + turned @ PEN.tcp_position, actual, atol=1e-6)
 
 
 @pytest.mark.slow
