@@ -9,7 +9,7 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import EULER_ANGLES, EVENT, JOINTS, POSITION, WRENCH, suffixed
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -38,6 +38,8 @@ class Row:
         The stroke that the set-point lies on; None on the way to, from and between strokes.
     joints : array, shape (n,), or None
         Actual, rad.
+    event : str
+        Outputs that were switched in this cycle.
     """
 
     t: float
@@ -53,6 +55,7 @@ class Row:
     phase: str
     id: str | None = None
     joints: Floats | None = None
+    event: str = ""
 
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
@@ -70,6 +73,8 @@ class RunLog:
         Whether there is a sensor, and a force coupling.
     joints : int
         How many joint angles the arm tells; 0 where none.
+    switching : bool
+        Whether outputs are switched.
 
     Attributes
     ----------
@@ -83,6 +88,7 @@ class RunLog:
         sensed: bool = False,
         coupled: bool = False,
         joints: int = 0,
+        switching: bool = False,
     ) -> None:
         groups = dict.fromkeys(("clock", *_TIMES), 1)
         for name, _ in _POSES:
@@ -91,7 +97,8 @@ class RunLog:
         groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
         self._joints = joints if joints <= len(JOINTS) else 0
         groups |= {"joints": self._joints} if self._joints else {}
-        self.rows = RowBuffer(groups, ("state", "phase", "id"))
+        self._texts = ("state", "phase", "id", *([EVENT] if switching else []))
+        self.rows = RowBuffer(groups, self._texts)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
     def __len__(self) -> int:
@@ -118,7 +125,7 @@ class RunLog:
         times = (row.t, row.t_plan, row.deadline, row.lateness)
         self.rows.add(
             (clock, *times, *planned, *row.sent, *row.actual, *felt),
-            (row.state, row.phase, row.id or ""),
+            (row.state, row.phase, row.id or "", row.event)[: len(self._texts)],
         )
 
     def columns(self) -> dict[str, AnyArray]:
@@ -148,7 +155,10 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         angles = rows.numbers("joints").reshape(len(rows), -1)
         out |= dict(zip(JOINTS, angles.T, strict=False))
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
-    return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
+    for name in ("id", EVENT):
+        if name in rows.texts:
+            out[name] = np.array([word or None for word in rows.words(name)], dtype=object)
+    return out
 
 
 def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from dmpcli.formats.motion import Motion
 from dmpcli.formats.registry import FileFormat
 from dmpcli.formats.toolpath import ProgramOptions
 from dmpcli.kinematics import models
-from dmpcli.messages import tell
+from dmpcli.messages import tell, warn
 from dmpcli.records import file_io, tool
 from dmpcli.settings.export import ExportOptions
 from dmpcli.spatial.rotations import from_euler
@@ -71,6 +71,12 @@ def export(motion: Motion, output: str | Path, chosen: FileFormat, options: Expo
         The format cannot hold them, or an arm cannot follow them.
     """
     prepared = _prepared(motion, chosen, options)
+    names = dict.fromkeys(event.output for one in prepared.strokes for event in one.events)
+    if names and not chosen.outputs:
+        warn(
+            f"{motion.name}: switches {', '.join(names)} on its way, of which {chosen.word} holds "
+            "nothing; urscript, krl and rapid do"
+        )
     name = Path(output).name
     if ID in name and not chosen.folder:
         for one in prepared.strokes:

@@ -142,6 +142,7 @@ def of_record(found: Record, source: Source | None = None) -> DrawnTrajectory | 
         one.id,
         one.first_row,
         one.facts,
+        one.events,
         found,
         source,
     )
