@@ -228,7 +228,7 @@ def _csv(
     separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
     names = _cells(text[:end], separator)
     untrusted.judge_columns(source.name, len(names), names)
-    headless = bool(names) and all(map(_is_number, names))
+    headless = _are_values(names)
     if headless and not given:
         raise HeadlessError(source.name, int(lines[0]), len(names))
     body = text if headless else text[end + 1 :]
@@ -384,6 +384,12 @@ def _is_number(cell: str) -> bool:
     return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
 
 
+def _are_values(cells: Sequence[str]) -> bool:
+    """Tell a row from names: numbers, among them a word or two such as a frame's name."""
+    numbers = sum(map(_is_number, cells))
+    return bool(cells) and (numbers == len(cells) or (numbers > 3 and len(cells) - numbers <= 2))
+
+
 def named(given: Sequence[str], count: int, source: str) -> list[str]:
     """Return names for all columns, the given ones first.
 
@@ -426,6 +432,21 @@ def commented_names(source: Source, count: int) -> list[str] | None:
 
 def _is_passed_over(line: str) -> bool:
     return line.strip()[:1] in ("", "#")
+
+
+def text_lines(source: Source) -> list[str]:
+    """Lines of a text file, however they end; without the empty ones at its end.
+
+    Raises
+    ------
+    InputError
+        It is not text.
+    """
+    try:
+        text = source.content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source.name}: is not text in UTF-8") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
 
 
 def counted_lines(source: Source) -> tuple[bytes, Integers]:
