@@ -119,8 +119,9 @@ def as_text(found: Row, width: int) -> str:
         lines += ["", _columns(found["columns"])]
     if "recording" in found:
         lines += ["", *recording_summary.lines(found["recording"], width)]
-    if "mapping" in found and "refused" in found["recording"]:
-        lines += ["", *textwrap.wrap(_advice(found), width)]
+    if "mapping" in found and "refused" in found["recording"] and "advice" not in found:
+        advice = _advice(found)
+        lines += textwrap.wrap(advice, width) if _AS_IT_IS not in advice else []
     return tables.plain(lines, width)
 
 
@@ -390,6 +391,9 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.6g}"
 
 
+_AS_IT_IS = "fit reads it as it is"
+
+
 def _advice(found: Row) -> str:
     mapping, suits = found["mapping"], found["layouts"]
     if "advice" in found:
@@ -410,7 +414,7 @@ def _advice(found: Row) -> str:
         )
     if all(layouts.parted(name)[0] == wanted for wanted, name in mapping.items()):
         told = all(layouts.parted(name)[1] for name in mapping.values())
-        return f"fit reads it as it is{'' if told else ', if lengths are in mm and times in s'}."
+        return f"{_AS_IT_IS}{'' if told else ', if lengths are in mm and times in s'}."
     how = " ".join(f"--map {wanted}={name}" for wanted, name in mapping.items() if name != wanted)
     return f"fit could read it with {how}; it also takes --length-unit and --time-unit."
 

@@ -108,7 +108,7 @@ def test_a_foreign_table_tells_how_fit_could_read_it(tmp_path):
     told = found(other)
     assert told["format"] == "Parquet"
     assert [column["missing"] for column in told["columns"]][:3] == [0, 1, 0]
-    assert "as it is" in dmpcli(other).stdout
+    assert "fit refuses it: column 'x', row 2: an empty cell" in dmpcli(other).stdout
 
 
 @pytest.mark.parametrize("name", ["skill", "plane", "tool"])
@@ -253,13 +253,8 @@ def test_a_recording_tells_what_fit_reads_and_would_trim_and_how(tmp_path):
     names = "timestamp," + ",".join(f"actual_TCP_pose_{i}" for i in range(6))
     before, after = np.arange(0.0, 5.0, 0.04), 13.0 + np.arange(0.04, 3.0, 0.04)
     t = np.concatenate([before, 5.0 + T, after])
-    way = np.concatenate(
-        [np.tile(rest[0], (len(before), 1)), XYZ, np.tile(rest[1], (len(after), 1))]
-    )
-    turn = R.as_rotvec()
-    turn = np.concatenate(
-        [np.tile(turn[0], (len(before), 1)), turn, np.tile(turn[-1], (len(after), 1))]
-    )
+    ends = [1 + len(before), *[1] * (len(T) - 2), 1 + len(after)]
+    way, turn = np.repeat(XYZ, ends, axis=0), np.repeat(R.as_rotvec(), ends, axis=0)
     keep = np.ones(len(t), dtype=bool)
     keep[200:204] = False
     log = tmp_path / "log.csv"
