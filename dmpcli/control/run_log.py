@@ -33,6 +33,10 @@ class Row:
         Compensated, at the TCP, base axes.
     coupling : float
         e of eq. (10), mm.
+    force : float
+        F_d of eq. (10), N.
+    contact : str
+        State of the contact.
     state, phase : str
     id : str or None
         The stroke that the set-point lies on; None on the way to, from and between strokes.
@@ -50,6 +54,8 @@ class Row:
     state: str
     phase: str
     id: str | None = None
+    force: float = 0.0
+    contact: str = ""
 
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
@@ -77,8 +83,9 @@ class RunLog:
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
-        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
-        self.rows = RowBuffer(groups, ("state", "phase", "id"))
+        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1, "fn": 1} if coupled else {})
+        words = ("state", "phase", "id", "contact") if coupled else ("state", "phase", "id")
+        self.rows = RowBuffer(groups, words)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
     def __len__(self) -> int:
@@ -98,11 +105,11 @@ class RunLog:
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
-            felt += (row.coupling,)
+            felt += (row.coupling, row.force)
         times = (row.t, row.t_plan, row.deadline, row.lateness)
         self.rows.add(
             (clock, *times, *planned, *row.sent, *row.actual, *felt),
-            (row.state, row.phase, row.id or ""),
+            (row.state, row.phase, row.id or "", row.contact)[: 4 if self._coupled else 3],
         )
 
     def columns(self) -> dict[str, AnyArray]:
@@ -128,6 +135,10 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out |= _split(rows.numbers("wrench"), WRENCH, "")
     if "coupling" in rows.groups:
         out["coupling"] = rows.numbers("coupling")
+    if "fn" in rows.groups:
+        out["fn"] = rows.numbers("fn")
+    if "contact" in rows.texts:
+        out["contact"] = np.array(rows.words("contact"), dtype=object)
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
     return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
 

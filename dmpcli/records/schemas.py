@@ -85,7 +85,8 @@ TRAJECTORY = Schema(
         "t": Column("s", "time since the stroke began"),
     }
     | _pose("planned TCP")
-    | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL},
+    | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL}
+    | {"fn": Column("N", "force along the normal to press with, 0 lifted", required=False)},
 )
 
 RUN = Schema(
@@ -106,6 +107,8 @@ RUN = Schema(
     | _wrench("compensated wrench on the tool, at the TCP, base axes")
     | {
         "coupling": Column("mm", "e of eq. (10), along the normal", required=False),
+        "fn": Column("N", "force along the normal to press with, 0 lifted", required=False),
+        "contact": Column("1", "state of the contact", "string", False),
         "state": Column("1", "robot state", "string"),
         "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
         "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),

@@ -55,9 +55,9 @@ def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():
 def test_the_set_points_wait_for_the_look_ahead():
     between = execution_plan.ways(ExecuteSettings(), 0.15, presses=False)
     assert (between.settling, between.clearance, between.spare) == (8, 20.0, 0.0)
-    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 5.0
+    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 15.0
     with pytest.raises(InputError, match="--clearance 5: must be over 5 mm"):
-        execution_plan.ways(ExecuteSettings(clearance=5.0), 0.0, presses=True)
+        execution_plan.ways(ExecuteSettings(clearance=5.0, coupling_clamp=5.0), 0.0, presses=True)
 
 
 def test_the_facts_hold_each_strokes_own_ends_once():
