@@ -108,6 +108,9 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Pro
     if normals:
         normal = np.concatenate(normals)
         columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
+    forces = [s.force for s in strokes if s.force is not None]
+    if forces:
+        columns["fn"] = np.concatenate(forces)
     return Record(schemas.TRAJECTORY, columns, p)
 
 
@@ -131,6 +134,8 @@ def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record
         columns |= {name: _column(block.euler[..., i]) for i, name in enumerate(EULER_ANGLES)}
     if block.normal is not None and block.normal.shape[1] > 1:
         columns |= {name: _column(block.normal[..., i]) for i, name in enumerate(NORMAL)}
+    if block.force is not None:
+        columns["fn"] = np.tile(block.force, count)
     return Record(schemas.TRAJECTORY, columns, p)
 
 

@@ -476,7 +476,7 @@ def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tm
     stroke = run.columns["phase"] == "stroke"
     force = run.columns["fz"][stroke & (run.columns["contact"] == "drawing")]
     said = run.provenance.facts["contact"]
-    assert said["mean"] == pytest.approx(force.mean(), abs=0.01)
+    assert said["mean"] == pytest.approx(force.mean(), abs=0.05)
     assert (said["absent"], said["share"], said["threshold"]) == (0.0, 1.0, 0.5)
     assert said["stiffness"] == pytest.approx(5.0, rel=0.1)
     assert said["landing_peak"] < 7.5
