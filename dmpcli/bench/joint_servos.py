@@ -7,12 +7,22 @@ behind a command that moves evenly it runs at ``c - lag·c'``, from which it dif
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 
-_EPS = 1e-9
+_EPS = 1e-6  # of a step: rounding
+_MOST = 256  # steps that are solved at once
+
+
+class Motion(NamedTuple):
+    """Some steps of a reference, each array of shape (n, 6): rad, rad/s, rad/s²."""
+
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
 
 
 class JointReference:
@@ -29,52 +39,83 @@ class JointReference:
 
     Attributes
     ----------
-    position, velocity, acceleration : array, shape (6,)
-        rad, rad/s and rad/s².
+    position, velocity : array, shape (6,)
+        rad and rad/s.
     """
 
     def __init__(self, joints: Floats, lag: float, delay: float, step: float) -> None:
         self._lag, self._delay, self._step = lag, delay, step
-        self._natural = 2.0 / lag
-        w, h = self._natural, step
-        decay = math.exp(-w * h)
-        self._transition = decay * np.array([[1.0 + w * h, h], [-w * w * h, 1.0 - w * h]])
+        w = self._natural = 2.0 / lag
+        ahead = step * np.arange(1, _MOST + 1)
+        decay = np.exp(-w * ahead)
+        # Of (e, e') over one step, two steps, ...
+        self._transitions = np.empty((_MOST, 2, 2))
+        self._transitions[:, 0, 0] = decay * (1.0 + w * ahead)
+        self._transitions[:, 0, 1] = decay * ahead
+        self._transitions[:, 1, 0] = -decay * w * w * ahead
+        self._transitions[:, 1, 1] = decay * (1.0 - w * ahead)
+        self._numbers = np.arange(1.0, _MOST + 1.0)[:, None]
         self._period = step
-        self.position = np.array(joints, dtype=float)
-        self.stand_still()
+        self.hold(joints)
 
     def start(self, period: float) -> None:
         """Take up each set-point within `period` s from now on."""
         self._period = period
 
-    def stand_still(self) -> None:
-        """Hold the joints where they are; set-points that are on their way are forgotten."""
-        self._command = self._target = self.position.copy()
+    def hold(self, joints: Floats) -> None:
+        """Stay at joint angles, shape (6,), rad; set-points on their way are forgotten."""
+        self.position, self.velocity = np.array(joints, dtype=float), np.zeros(6)
+        self._command, self._target = self.position, self.position
         self._rate, self._left = np.zeros(6), 0
         self._coming: deque[tuple[float, Floats]] = deque()
-        self.velocity, self.acceleration = np.zeros(6), np.zeros(6)
 
     def send(self, t: float, joints: Floats) -> None:
         """Head for a set-point that has arrived at time `t`, s, once the delay has passed."""
-        self._coming.append((t + self._delay, joints.copy()))
+        self._coming.append((t + self._delay, np.array(joints, dtype=float)))
 
-    def advance(self, t: float) -> None:
-        """Go on by one step of the grid, from time `t`, s."""
-        while self._coming and self._coming[0][0] <= t + _EPS:
+    def advance(self, t: float, most: int) -> Motion:
+        """Go on by some steps of the grid, as far as nothing changes meanwhile.
+
+        Parameters
+        ----------
+        t : float
+            Time at the beginning, s.
+        most : int
+            How many steps at most, one or more.
+
+        Returns
+        -------
+        Motion
+            At the end of each step.
+        """
+        while self._coming and self._steps_to(self._coming[0][0] - t) <= 0:
             self._head_for(self._coming.popleft()[1])
-        rate = self._rate
+        n = min(most, _MOST)
+        if self._left:
+            n = min(n, self._left)
+        if self._coming:
+            n = min(n, self._steps_to(self._coming[0][0] - t))
+        rate, w = self._rate, self._natural
         error = np.array([self.position - self._command + self._lag * rate, self.velocity - rate])
-        error = self._transition @ error
-        if self._left > 0:
-            self._left -= 1
-            # At its end the command is the set-point itself, whatever was rounded on the way.
-            self._command = self._command + self._step * rate if self._left else self._target
+        errors = self._transitions[:n] @ error
+        commands = self._command + (self._step * self._numbers[:n]) * rate
+        motion = Motion(
+            commands - self._lag * rate + errors[:, 0],
+            rate + errors[:, 1],
+            -w * w * errors[:, 0] - 2.0 * w * errors[:, 1],
+        )
+        self.position, self.velocity = motion.position[-1], motion.velocity[-1]
+        self._command = commands[-1]
+        if self._left:
+            self._left -= n
             if not self._left:
-                self._rate = np.zeros(6)
-        self.position = self._command - self._lag * rate + error[0]
-        self.velocity = rate + error[1]
-        w = self._natural
-        self.acceleration = -w * w * error[0] - 2.0 * w * error[1]
+                # At its end the command is the set-point itself, whatever was rounded.
+                self._command, self._rate = self._target, np.zeros(6)
+        return motion
+
+    def _steps_to(self, wait: float) -> int:
+        """Steps that begin before `wait` s have passed."""
+        return math.ceil(wait / self._step - _EPS)
 
     def _head_for(self, joints: Floats) -> None:
         self._target, self._left = joints, max(round(self._period / self._step), 1)

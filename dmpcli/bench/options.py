@@ -8,16 +8,30 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.bench import scene
+from dmpcli.bench.mesh_workpieces import COLLISIONS, read
 from dmpcli.bench.parameters import BenchParameters, JointServos, Pen, WristSensor
-from dmpcli.bench.workpiece import Flat, Nothing, Round, Workpiece, moved, placed
+from dmpcli.bench.workpiece import (
+    Edge,
+    Flat,
+    Nothing,
+    Ramp,
+    Round,
+    Slot,
+    Step,
+    Workpiece,
+    moved,
+    placed,
+)
 from dmpcli.errors import InputError
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.options import Options
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 _FAR = 1e4
-SHAPES = ("plane", "cylinder", "none")
+SHAPES = ("plane", "cylinder", "edge", "step", "slot", "ramp", "wall", "none")
+"""Surfaces that need no file."""
 
 
 def agreed(address: Address, arm: str, said: dict[str, str]) -> str:
@@ -133,7 +147,7 @@ def _tool(options: Options, usual: Tool) -> Tool:
 
 def _workpiece(options: Options, tip: Floats) -> Workpiece:
     number = options.number
-    shape = options.choice("surface", "plane", *SHAPES)
+    shape = options.text("surface") or "plane"
     point = np.array(
         [
             number(f"at_{key}", float(value), -_FAR, _FAR, "mm")
@@ -141,19 +155,43 @@ def _workpiece(options: Options, tip: Floats) -> Workpiece:
         ]
     )
     normal = np.array([number(f"n{key}", float(key == "z"), -1.0, 1.0, "") for key in "xyz"])
-    along = math.radians(number("axis", 0.0, -360.0, 360.0, "degrees"))
-    radius = number("radius", 60.0, 1.0, 1e4, "mm")
+    along = math.radians(number("along", 0.0, -360.0, 360.0, "degrees"))
     offset = number("offset", 0.0, -500.0, 500.0, "mm")
     tilt = math.radians(number("tilt", 0.0, -80.0, 80.0, "degrees"))
     about = math.radians(number("about", 0.0, -360.0, 360.0, "degrees"))
     length = float(np.linalg.norm(normal))
     if length < 1e-6:
         raise InputError("bench: nx, ny, nz: the normal has no length")
-    # The axis of a cylinder is the frame's y, its x is across.
     across = np.array([math.cos(along), math.sin(along), 0.0])
     if abs(across @ normal) > 0.99 * length:
         across = np.array([0.0, 0.0, 1.0])
-    pose = moved(placed(point, normal / length, across), offset, tilt, about)
-    if shape == "none":
-        return Nothing(pose)
-    return Flat(pose) if shape == "plane" else Round(pose, radius)
+    frame = placed(point, normal / length, across)
+    return replace(_shape(options, shape, frame, tip), pose=moved(frame, offset, tilt, about))
+
+
+def _shape(options: Options, shape: str, frame: Pose, tip: Floats) -> Nothing:
+    """The surface where the plan has it."""
+    number = options.number
+    radius = number("radius", 60.0, 1.0, 1e4, "mm")
+    far = number("far", 50.0, -1e3, 1e3, "mm")
+    height = number("height", 3.0, 0.01, 100.0, "mm")
+    width = number("width", 10.0, 0.1, 1e3, "mm")
+    slope = math.radians(number("slope", 30.0, 1.0, 80.0, "degrees"))
+    collision = options.choice("collide", "closest", *COLLISIONS)
+    grid = number("grid", 1.0, 0.05, 100.0, "mm")
+    known: dict[str, Nothing] = {
+        "none": Nothing(frame),
+        "plane": Flat(frame),
+        "cylinder": Round(frame, radius),
+        "edge": Edge(frame, far),
+        "step": Step(frame, far, -height),
+        "wall": Step(frame, far, height),
+        "slot": Slot(frame, far, width),
+        "ramp": Ramp(frame, far, height, slope),
+    }
+    if shape in known:
+        return known[shape]
+    path = Path(shape)
+    if not path.suffix:
+        raise options.wrong("surface", f"one of {', '.join(SHAPES)}, or a file")
+    return read(path, frame, tip, collision, grid)

@@ -10,6 +10,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.bench.parameters import BenchParameters
+from dmpcli.bench.workpiece import Traced
 from dmpcli.errors import InputError
 from dmpcli.kinematics.models import Arm
 from dmpcli.spatial.pose import Pose
@@ -31,6 +32,9 @@ _THICK = 0.05  # m, radius of a link
 # the step allows, and at an impedance of 0.999 it gives way by some 0.1 % of what the pen does.
 _IMPEDANCE = 0.999
 _LEAST_MASS = 0.05  # kg, of what does not slide
+
+TRACED = "traced"
+"""Body of the plane under the tip."""
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 7))
 
@@ -62,8 +66,6 @@ def build(parameters: BenchParameters, arm: Arm, mujoco: Any) -> Any:
         "option",
         timestep=_text(parameters.grid),
         integrator="implicitfast",
-        cone="elliptic",
-        impratio="10",
         gravity=_text(down),
     )
     assets = ET.SubElement(root, "asset")
@@ -71,8 +73,8 @@ def build(parameters: BenchParameters, arm: Arm, mujoco: Any) -> Any:
     contact = {
         "solref": _text([2.0 * parameters.grid, 1.0]),
         "solimp": _text([_IMPEDANCE, _IMPEDANCE, 1e-3]),
-        "friction": _text([parameters.pen.friction, 0.0, 0.0]),
-        "condim": "3",
+        # Without friction: `World` adds it. MuJoCo's own makes a pen that slides rattle.
+        "condim": "1",
     }
     _add_workpiece(parameters, world, assets, contact)
     _add_pen(parameters, _add_tool(parameters, _add_arm(parameters, arm, world)), contact)
@@ -183,6 +185,11 @@ def _add_workpiece(
     parameters: BenchParameters, world: ET.Element, assets: ET.Element, contact: dict[str, str]
 ) -> None:
     workpiece = parameters.workpiece
+    if isinstance(workpiece, Traced):
+        # A plane that is laid under the tip, step by step.
+        traced = ET.SubElement(world, "body", {"name": TRACED, "mocap": "true"})
+        ET.SubElement(traced, "geom", {**contact, "type": "plane", "size": "1 1 0.1"})
+        return
     body = ET.SubElement(world, "body", {"name": "workpiece", **_placed(workpiece.pose)})
     for one in workpiece.assets():
         attributes = dict(one)
