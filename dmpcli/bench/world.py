@@ -265,6 +265,7 @@ class World:
         # Before the next contacts are found, to which these forces would not belong.
         self._feel_contacts()
         if self._traced is not None:
+            mujoco.mj_kinematics(model, data)
             self._trace(self._traced)
         mujoco.mj_step1(model, data)
         self._steps += 1
