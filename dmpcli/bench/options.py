@@ -114,7 +114,8 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
         bias=np.concatenate([bias, np.zeros(3)]),
         latency=number("latency", 0.0, 0.0, 1.0, "s"),
     )
-    read = BenchParameters(
+    truth = options.text("truth")
+    read_from = BenchParameters(
         arm=arm,
         position=position,
         rotation=rotation,
@@ -125,9 +126,10 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
         workpiece=_workpiece(options, Pose(position, rotation)),
         step=number("step", 0.0, 1e-5, 2e-3, "s") or None,
         seed=options.whole("seed", 0, 0, 2**31 - 1),
+        truth=None if truth is None else Path(truth),
     )
     options.done()
-    return read
+    return read_from
 
 
 _ANGLES = ("rx", "ry", "rz")
