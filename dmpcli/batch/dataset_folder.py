@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -32,7 +33,9 @@ class Folder:
 
     def __init__(self, job: Job) -> None:
         self.path = Path(job.folder)
-        self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
+        columns = {schemas.EVENT: np.empty(0, dtype=object)} if job.task.events else {}
+        empty = Record(schemas.TRAJECTORY, columns, job.provenance)
+        self._expected = json.loads(record.header(empty))
 
     def open(self, numbers: Iterable[int], whole: bool) -> dict[int, Outcome]:
         """Make room for these parts, and return the outcomes of those that are already there.

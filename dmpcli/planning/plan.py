@@ -13,6 +13,7 @@ from dmpcli.errors import InputError
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.spline import between, spline, window
 from dmpcli.spatial import rotations
+from dmpcli.spatial.output_events import OutputEvent
 
 Phase = Literal["approach", "stroke", "retract", "transfer", "stop"]
 Pose = tuple[Floats, Floats]
@@ -48,6 +49,8 @@ class PlannedStroke:
         Unit normal of the surface, to the tool's side.
     first_row : int
         Row of the file that holds the first sample, counted from 1.
+    events : tuple of OutputEvent
+        What is switched along it, on the time of `t`.
     force : array, shape (n,), or None
         Set-point of the force along the normal, N; 0 where the tool is lifted.
     """
@@ -58,6 +61,7 @@ class PlannedStroke:
     rotation: Floats | None = None
     normal: Floats | None = None
     first_row: int = 1
+    events: tuple[OutputEvent, ...] = ()
     force: Floats | None = None
 
     def pose(self, index: int) -> Pose:
@@ -106,6 +110,8 @@ class Plan:
         The stroke's.
     legs : tuple of (str, int)
         Phases in order, each with the number of its first set-point.
+    events : tuple of (float, OutputEvent)
+        What is switched, by the number of the set-point or between two.
     force : array, shape (n,), or None
         Set-point of the force along the normal, N; 0 where the tool is lifted.
     """
@@ -120,6 +126,7 @@ class Plan:
     oriented: bool
     id: str
     legs: tuple[tuple[Phase, int], ...]
+    events: tuple[tuple[float, OutputEvent], ...] = ()
     force: Floats | None = None
 
     def __len__(self) -> int:
@@ -248,9 +255,10 @@ def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> 
     position, turned = _resample(stroke.t, stroke.position, rotation, t)
     normal = None if stroke.normal is None else _unit(_linear(stroke.t, stroke.normal, t))
     force = None if stroke.force is None else _pressed(stroke.t, stroke.force, t)
-    return replace(
-        stroke, t=t - stroke.t[0], position=position, rotation=turned, normal=normal, force=force
-    )
+    begun = float(stroke.t[0])
+    events = tuple(replace(event, t=event.t - begun) for event in stroke.events)
+    moved = replace(stroke, t=t - begun, position=position, rotation=turned)
+    return replace(moved, normal=normal, events=events, force=force)
 
 
 def joined(
@@ -297,6 +305,10 @@ def joined(
         oriented,
         sampled.id,
         tuple((leg.phase, first) for leg, first in zip(parts, numbers, strict=False)),
+        tuple(
+            (lead + float(np.interp(event.t, sampled.t, np.arange(len(sampled.t)))), event)
+            for event in sampled.events
+        ),
         None if sampled.force is None else held(sampled.force),
     )
 

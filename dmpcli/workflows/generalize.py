@@ -18,6 +18,8 @@ from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import AskedEvent
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
@@ -141,11 +143,24 @@ def prepared(order: Order) -> Ready:
     _judge(order, table, given, style)
     taught = learning_record.of_skill(skill.file).facts()
     return Ready(
-        Task(skill.plain(), given, style, reach),
+        Task(skill.plain(), given, style, reach, _events(settings)),
         table,
         _durations(skill, table, settings),
         Provenance("generalize", options, tuple(inputs), taught),
     )
+
+
+def _events(settings: GeneralizeSettings) -> tuple[AskedEvent, ...]:
+    """Return what is switched along each stroke, and tell what stays on."""
+    events = output_events.asked(settings.event or ())
+    for name in dict.fromkeys(event.output for event in events):
+        own = [event for event in events if event.output == name]
+        if all(event.on for event in own):
+            warn(
+                f"{name} is switched on and never off: execute switches it off when a run ends, a "
+                f"robot program leaves it on; --event off@end:{name} has it off with the stroke"
+            )
+    return events
 
 
 def _check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> None:

@@ -84,6 +84,9 @@ def import_file(
             f"{name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
             f"NAME, or put {ID} into the name of the output for a file of each"
         )
+    for one in strokes:
+        if one.events:
+            tell(f"{name}: {_switched(one)}")
     said: dict[str, Any] = {"format": kind}
     if form is not None:
         said["layout"] = form.as_options()
@@ -290,6 +293,20 @@ def demonstration(
         columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
     origin = Provenance("import", options, tuple(inputs))
     return Record(schemas.DEMONSTRATION, columns, origin)
+
+
+def _switched(one: MotionStroke) -> str:
+    """Say what a stroke switches, which no demonstration holds, and how to have it again."""
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(one.position, axis=0), axis=1))])
+    words = []
+    for event in one.events[:10]:
+        place = np.interp(event.t, one.t, gone)
+        words.append(f"--event {'on' if event.on else 'off'}@{place:.4f}mm:{event.output}")
+    more = "" if len(one.events) <= 10 else f" and {len(one.events) - 10} more"
+    return (
+        f"stroke {one.id!r} switches outputs, and a demonstration holds none: generalize "
+        f"{' '.join(words)}{more} does"
+    )
 
 
 def _safe(name: str) -> str:
