@@ -11,7 +11,6 @@ text alone, so that a change elsewhere does not draw another.
 """
 
 import argparse
-import ast
 import collections
 import gc
 import hashlib
@@ -77,9 +76,6 @@ def listed(again: Path) -> list[operators.Mutant]:
 
 def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     """Try a mutant on the tests that may tell it, stage by stage."""
-    path = Path(mutant.file).resolve()
-    name = ".".join(Path(mutant.file).with_suffix("").parts)
-    text = path.read_text(encoding="utf-8")
     row: Row = {
         "file": mutant.file,
         "line": mutant.line,
@@ -93,8 +89,7 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     for tests in choice.stages(mutant, known, budget):
         row["tests"] += len(tests)
         limit = 20.0 + 4.0 * sum(known.seconds[test] for test in tests)
-        tree = operators.mutated(mutant.file, text, mutant.number)
-        verdict = trial.attempt(name, path, tree, tests, limit)
+        verdict = trial.attempt(mutant.file, mutant, tests, limit)
         row |= {"killed": verdict.killed, "by": verdict.by, "how": verdict.how}
         if verdict.trouble:
             row["trouble"] = verdict.trouble
@@ -107,12 +102,9 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
 def unharmed(sample: list[operators.Mutant], known: reach.Reach, budget: float) -> None:
     """Try the module as it is where mutants are tried: what fails there says nothing of mutants."""
     for mutant in sample:
-        path = Path(mutant.file).resolve()
-        name = ".".join(Path(mutant.file).with_suffix("").parts)
         for tests in choice.stages(mutant, known, budget):
             limit = 20.0 + 4.0 * sum(known.seconds[test] for test in tests)
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            verdict = trial.attempt(name, path, tree, tests, limit)
+            verdict = trial.attempt(mutant.file, None, tests, limit)
             if verdict.killed or verdict.trouble:
                 raise SystemExit(f"{verdict.by} fails without a mutant: {verdict}")
 
@@ -223,7 +215,7 @@ def main() -> int:
     reach.load(known.modules)
     gc.collect()
     gc.freeze()
-    unharmed(mutants[:: max(1, len(mutants) // 10)][:10], known, args.budget)
+    unharmed(mutants[:: max(1, len(mutants) // 5)][:5], known, args.budget)
     rows = run(mutants, known, args.budget, args.jobs, kept)
     told = f"{table(rows)}\n\n{survivors(rows)}\n"
     kept.with_suffix(".md").write_text(told, encoding="utf-8")

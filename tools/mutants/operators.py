@@ -69,6 +69,7 @@ class Mutant:
     scope: str
     in_function: bool
     operator: str
+    tree: ast.Module
     statement: ast.stmt
     node: ast.AST
     new: ast.AST
@@ -97,6 +98,11 @@ class Mutant:
         """The statement as the mutant has it."""
         statement, node = copy.deepcopy([self.statement, self.node])
         return _told(self.new if node is statement else _Place(node, self.new).visit(statement))
+
+    def placed(self) -> ast.Module:
+        """Put the mutant into the tree: what stood there is lost, so only a child may."""
+        _Place(self.node, ast.copy_location(self.new, self.node)).visit(self.tree)
+        return ast.fix_missing_locations(self.tree)
 
     @property
     def name(self) -> str:
@@ -278,21 +284,12 @@ def _walk(tree: ast.Module) -> Iterator[tuple[ast.AST, ast.stmt, tuple[str, ...]
 
 def mutants(file: str, text: str) -> list[Mutant]:
     """List all mutants of a source file, in the order of its text."""
-    return _mutants(file, ast.parse(text))
-
-
-def _mutants(file: str, tree: ast.Module) -> list[Mutant]:
+    tree = ast.parse(text)
     found: list[Mutant] = []
     for node, statement, scope, inside in _walk(tree):
         for operator, new in edits(node):
             within = ".".join(scope)
-            found.append(Mutant(file, len(found), within, inside, operator, statement, node, new))
+            found.append(
+                Mutant(file, len(found), within, inside, operator, tree, statement, node, new)
+            )
     return found
-
-
-def mutated(file: str, text: str, number: int) -> ast.Module:
-    """Give the tree of a source file with one of its mutants."""
-    tree = ast.parse(text)
-    found = _mutants(file, tree)[number]
-    _Place(found.node, ast.copy_location(found.new, found.node)).visit(tree)
-    return ast.fix_missing_locations(tree)

@@ -25,6 +25,7 @@ from types import CodeType, ModuleType
 import hypothesis
 import pytest
 
+from tools.mutants.operators import Mutant
 from tools.mutants.reach import QUIET
 
 _MEMORY = 4 * 2**30
@@ -109,7 +110,7 @@ class _Told:
 
 
 def _in_child(
-    name: str, file: Path, tree: ast.Module | None, tests: list[str], seconds: float, pipe: int
+    file: str, mutant: Mutant | None, tests: list[str], seconds: float, pipe: int
 ) -> None:
     """Run the tests of one trial; never returns."""
     code = 70
@@ -123,9 +124,11 @@ def _in_child(
         resource.setrlimit(resource.RLIMIT_AS, (pages + _MEMORY,) * 2)
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 6))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        if tree is not None:
-            changed = compile(tree, str(file), "exec")
-            sys.meta_path.insert(0, _Changed(name, file, changed))
+        path = Path(file).resolve()
+        tree = mutant.placed() if mutant else ast.parse(path.read_text(encoding="utf-8"))
+        changed = compile(tree, str(path), "exec")
+        name = ".".join(Path(file).with_suffix("").parts)
+        sys.meta_path.insert(0, _Changed(name, path, changed))
         scratch = tempfile.mkdtemp(prefix="mutant")
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         options = [*QUIET[:-1], "--tb=no", "-x", *_LOADED, f"--basetemp={scratch}/t"]
@@ -154,9 +157,7 @@ def _listen(pipe: int, until: float) -> tuple[bytes, bool]:
     return told, False
 
 
-def attempt(
-    name: str, file: Path, tree: ast.Module | None, tests: list[str], seconds: float
-) -> Verdict:
+def attempt(file: str, mutant: Mutant | None, tests: list[str], seconds: float) -> Verdict:
     """Run tests with a module changed (None: as it is), fastest given first, until one fails.
 
     ``seconds`` is the processor time after which the trial is taken for endless, and a kill; six
@@ -166,7 +167,7 @@ def attempt(
     child = os.fork()
     if child == 0:
         os.close(reading)
-        _in_child(name, file, tree, tests, seconds, writing)
+        _in_child(file, mutant, tests, seconds, writing)
     os.close(writing)
     told, ended = _listen(reading, time.monotonic() + 6 * seconds + 30)
     os.close(reading)
