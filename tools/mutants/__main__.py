@@ -63,9 +63,9 @@ def drawn(rooms: list[str], count: int, seed: int) -> list[operators.Mutant]:
 
 def listed(again: Path) -> list[operators.Mutant]:
     """Find the survivors of an earlier run again, by name."""
-    rows = [json.loads(line) for line in again.read_text().splitlines()]
-    names = {row["name"] for row in rows if not row["killed"]}
-    files = sorted({row["file"] for row in rows if not row["killed"]})
+    left = [row for row in _rows(again) if row.get("killed") is False]
+    names = {row["name"] for row in left}
+    files = sorted({row["file"] for row in left})
     return [
         mutant
         for file in files
@@ -88,7 +88,7 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     begun = time.monotonic()
     for tests in choice.stages(mutant, known, budget):
         row["tests"] += len(tests)
-        limit = 20.0 + 4.0 * sum(known.seconds[test] for test in tests)
+        limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
         verdict = trial.attempt(mutant.file, mutant, tests, limit)
         row |= {"killed": verdict.killed, "by": verdict.by, "how": verdict.how}
         if verdict.trouble:
@@ -99,14 +99,16 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     return row
 
 
-def unharmed(sample: list[operators.Mutant], known: reach.Reach, budget: float) -> None:
-    """Try the module as it is where mutants are tried: what fails there says nothing of mutants."""
+def unharmed(sample: list[operators.Mutant], known: reach.Reach, budget: float) -> Row:
+    """Try modules as they are where mutants are tried: what fails there says nothing of mutants."""
+    failed = []
     for mutant in sample:
         for tests in choice.stages(mutant, known, budget):
-            limit = 20.0 + 4.0 * sum(known.seconds[test] for test in tests)
+            limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
             verdict = trial.attempt(mutant.file, None, tests, limit)
             if verdict.killed or verdict.trouble:
-                raise SystemExit(f"{verdict.by} fails without a mutant: {verdict}")
+                failed.append(f"{verdict.by} {verdict.how}{verdict.trouble}")
+    return {"name": "unharmed", "failed": failed}
 
 
 def run(
@@ -122,19 +124,26 @@ def run(
         if worker == 0:
             try:
                 for mutant in left[job::jobs]:
-                    line = json.dumps(judged(mutant, known, budget), ensure_ascii=False) + "\n"
-                    with kept.open("ab", buffering=0) as file:
-                        file.write(line.encode())
+                    _keep(kept, judged(mutant, known, budget))
+                if job == 0 and "unharmed" not in done:
+                    _keep(kept, unharmed(mutants[:5], known, budget))
             finally:
                 os._exit(0)
         workers.append(worker)
     for worker in workers:
         os.waitpid(worker, 0)
-    names = {mutant.name for mutant in mutants}
-    rows = [row for row in _rows(kept) if row["name"] in names]
-    if len({row["name"] for row in rows}) < len(names):
+    rows = {row["name"]: row for row in _rows(kept)}
+    names = list(dict.fromkeys(["unharmed", *(mutant.name for mutant in mutants)]))
+    if not rows.keys() >= set(names):
         raise SystemExit("a judge has died; run again, and it goes on from here")
-    return rows
+    if rows["unharmed"]["failed"]:
+        raise SystemExit(f"fail without a mutant too: {rows['unharmed']['failed']}")
+    return [rows[name] for name in names[1:]]
+
+
+def _keep(kept: Path, row: Row) -> None:
+    with kept.open("ab", buffering=0) as file:
+        file.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
 
 
 def _rows(kept: Path) -> list[Row]:
@@ -215,7 +224,6 @@ def main() -> int:
     reach.load(known.modules)
     gc.collect()
     gc.freeze()
-    unharmed(mutants[:: max(1, len(mutants) // 5)][:5], known, args.budget)
     rows = run(mutants, known, args.budget, args.jobs, kept)
     told = f"{table(rows)}\n\n{survivors(rows)}\n"
     kept.with_suffix(".md").write_text(told, encoding="utf-8")

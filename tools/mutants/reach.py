@@ -12,7 +12,10 @@ from typing import Any
 import coverage
 import pytest
 
-QUIET = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:cov", "--tb=short")
+QUIET = (
+    *("-q", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:cov"),
+    *("-W", "ignore::pytest.PytestAssertRewriteWarning"),  # plugins are loaded beforehand
+)
 
 
 class _Watch:

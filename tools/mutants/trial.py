@@ -30,8 +30,6 @@ from tools.mutants.reach import QUIET
 
 _MEMORY = 4 * 2**30
 """Bytes beyond those of the parent."""
-_LOADED = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
-"""Plugins are loaded beforehand too, by intent."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ def _in_child(
         sys.meta_path.insert(0, _Changed(name, path, changed))
         scratch = tempfile.mkdtemp(prefix="mutant")
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
-        options = [*QUIET[:-1], "--tb=no", "-x", *_LOADED, f"--basetemp={scratch}/t"]
+        options = [*QUIET, "--tb=no", "-x", f"--basetemp={scratch}/t"]
         code = int(pytest.main([*options, *files], plugins=[_Told(tests, pipe)]))
     except SyntaxError:
         os.write(pipe, b"unloaded the module itself\n")
