@@ -19,6 +19,7 @@ from dmpcli.arrays import AnyArray, Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import Motion, MotionStroke
 from dmpcli.records import untrusted
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 
@@ -229,6 +230,11 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     InputError
         Damaged, of another state, or with several episodes and none chosen.
     """
+    with untrusted.decoding(str(folder)):
+        return _read(folder, episode)
+
+
+def _read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     names, episodes = _described(folder)
     number = _number(folder, episode, episodes)
     files = sorted((folder / "data").rglob("*.parquet"))
@@ -240,8 +246,16 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     if not parts:
         raise InputError(f"{folder}: holds no samples of episode {number}")
     state, t = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-    if len(t) < 2 or not np.isfinite(state).all() or not np.isfinite(t).all():
-        raise InputError(f"{folder}: episode {number} holds a value that is not finite, or nothing")
+    felt = np.concatenate([part[2] for part in parts]) if wrench else None
+    _check_width(folder, _STATE, state, len(names))
+    if felt is not None:
+        _check_width(folder, _WRENCH, felt, len(_FELT))
+    values = (t, state) if felt is None else (t, state, felt)
+    if len(t) < 2 or not all((np.abs(each) <= LARGEST).all() for each in values):
+        raise InputError(
+            f"{folder}: episode {number} holds a value that is not a number or beyond "
+            f"{LARGEST:g}, or nothing"
+        )
     if (np.diff(t) <= 0.0).any():
         raise InputError(f"{folder}: episode {number}: its time does not increase")
     place = [names.index(name) for name in _PLACE]
@@ -253,8 +267,15 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
         if bad is not None:
             raise InputError(f"{folder}: episode {number}, frame {bad[0]}: {bad[1]}")
         R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    felt = np.concatenate([part[2] for part in parts]) if wrench else None
     return MotionStroke(t, state[:, place] * 1000.0, R, id=str(number), wrench=felt), told
+
+
+def _check_width(folder: Path, name: str, values: Floats, width: int) -> None:
+    if values.shape[1] != width:
+        raise InputError(
+            f"{folder}: {name} holds {values.shape[1]} numbers a sample, {width} are described; "
+            "the dataset is damaged"
+        )
 
 
 def _described(folder: Path) -> tuple[list[str], int]:
@@ -263,7 +284,15 @@ def _described(folder: Path) -> tuple[list[str], int]:
         info = json.loads((folder / INFO).read_text(encoding="utf-8"))
         version, state = str(info["codebase_version"]), info["features"][_STATE]
         names, episodes = state.get("names"), int(info["total_episodes"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (
+        OSError,
+        ArithmeticError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):
         raise InputError(f"{folder}: {INFO} is missing or damaged; no LeRobot dataset") from None
     if isinstance(names, dict) and len(names) == 1:
         [names] = names.values()
