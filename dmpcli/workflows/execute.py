@@ -189,7 +189,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(preflight_table.table(judged))
+            tell(preflight_table.table(judged), preflight_table.facts(judged))
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
