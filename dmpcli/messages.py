@@ -172,6 +172,31 @@ def logged(path: Path | None, line: str) -> Iterator[None]:
         file.close()
 
 
+@contextlib.contextmanager
+def diverted(shown: Callable[[str], bool]) -> Iterator[None]:
+    """Give what would be written to standard error to something that shows it above a picture.
+
+    Parameters
+    ----------
+    shown : callable
+        Takes a text; False where it could not be shown, and it is written as ever.
+    """
+    terminal = _terminal()
+    if terminal is None:
+        yield
+        return
+
+    def show(text: str) -> None:
+        if not shown(printable(text)):
+            say(text)
+
+    terminal.shown = show
+    try:
+        yield
+    finally:
+        terminal.shown = say
+
+
 def wanted() -> bool:
     """Tell whether what a person may want to know is heard at all."""
     terminal = _terminal()
@@ -222,18 +247,6 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)
         yield lambda steps: bar.advance(task, steps)
-
-
-@contextlib.contextmanager
-def status(text: str) -> Iterator[None]:
-    """Show a line on the command line's terminal while something goes on; elsewhere nothing."""
-    if not watched():
-        yield
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(text):
-        yield
 
 
 def watched() -> bool:

@@ -14,6 +14,7 @@ from dmpcli.control import (
     preflight_table,
     stopping,
     stroke_file,
+    watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -341,7 +342,9 @@ def _stream(
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
-            outcome = loop.run(interruption)
+            with watching.live(lambda: watching.of_plan(loop), realtime) as ended:
+                outcome = loop.run(interruption)
+                ended(outcome.reason)
         finally:
             if len(loop.log):
                 made = execution.record_of(loop, outcome, provenance, realtime)
