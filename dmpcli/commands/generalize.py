@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from dmpcli.commands.options import SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import ARMS, SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.commands.process_options import KeepOut
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
-from dmpcli.settings.options import Given, with_options
+from dmpcli.settings.options import Given, choice, with_options
 
 
 @with_options
@@ -65,7 +65,9 @@ def command(
     robot_model: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66, ur5e."
+            metavar="NAME",
+            help="Check reach, joint limits and speeds of an arm: ec66, ur5e.",
+            autocompletion=choice(*ARMS),
         ),
     ] = None,
     tool: Annotated[
