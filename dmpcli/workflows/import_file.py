@@ -297,10 +297,12 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     t = np.interp(np.arange(ends[-1] + 1), ends, one.t)
     t = t[np.concatenate([[True], np.diff(t) > 0.0])]
     position = np.column_stack([np.interp(t, one.t, axis) for axis in one.position.T])
-    R = None if one.rotation is None else np.empty((len(t), 3, 3))
-    for first in range(0, len(t), _AT_ONCE) if R is not None else ():
-        part = slice(first, first + _AT_ONCE)
-        R[part] = interpolate(one.t, np.asarray(one.rotation), t[part])
+    R = None
+    if one.rotation is not None:
+        R = np.empty((len(t), 3, 3))
+        for first in range(0, len(t), _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            R[part] = interpolate(one.t, np.asarray(one.rotation), t[part])
     return replace(one, t=t, position=position, rotation=R)
 
 
