@@ -14,7 +14,7 @@
 #   make judges      the tests that programs of others judge, which make test does without
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
-#   make mutations   damaged and crafted inputs for every reader: what is not refused
+#   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -138,8 +138,11 @@ faults: $(VENV)/installed
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
 
+# Of each reader; one number replays one: python -m benchmarks.mutations --again READER NUMBER.
+MUTATIONS ?= 2000
+
 mutations: $(VENV)/installed
-	$(BIN)/python -m benchmarks.mutations --keep $(OUT)/mutations
+	$(BIN)/python -m benchmarks.mutations --count $(MUTATIONS) --keep $(OUT)/mutations
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 

@@ -63,6 +63,8 @@ class PlanLoop(ControlLoop):
         By how much more than its look-ahead the arm may lag at a stroke's end, s.
     plan : Plan
         The one that is drawn.
+    period, duration : float
+        Of its cycles, and of all plans, s.
     drawn : list of str
         Ids of the strokes that were drawn to their ends.
     pressing : ForceTracker or None
@@ -93,6 +95,7 @@ class PlanLoop(ControlLoop):
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
         self.plan, self._then = plan, deque(then)
+        self.period, self.duration = plan.period, plan.period * sum(map(len, (plan, *then)))
         self.drawn: list[str] = []
         self._short: dict[str, float] = {}
         self.pressing: ForceTracker | None = touch.pressing if touch else None

@@ -153,6 +153,8 @@ PAIRS = Schema(
         "nx": Column("1", "unit normal of the pair's plane", required=False),
         "ny": Column("1", "unit normal of the pair's plane", required=False),
         "nz": Column("1", "unit normal of the pair's plane", required=False),
+        "drawn_on": Column("1", "surface, as the table of pairs names it", "string", False),
+        "surface_sha256": Column("1", "of the surface's file", "string", required=False),
         "part": Column("1", "file that holds the trajectory", "string", required=False),
         "status": Column("1", "ok, or why there is no trajectory", "string"),
     },

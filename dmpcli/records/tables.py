@@ -306,9 +306,10 @@ def _is_small(cell: str) -> bool:
 def _parsed(body: bytes, names: Sequence[str], separator: bytes, kinds: Mapping[str, Any]) -> Any:
     from pyarrow import csv
 
+    block = min(_BLOCK, len(body) + 1)  # it is taken whole
     return csv.read_csv(
         io.BytesIO(body),
-        read_options=csv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
+        read_options=csv.ReadOptions(use_threads=False, block_size=block, column_names=names),
         parse_options=csv.ParseOptions(
             delimiter=separator.decode(), newlines_in_values=b'"' in body
         ),

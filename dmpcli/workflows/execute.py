@@ -15,6 +15,7 @@ from dmpcli.control import (
     preflight_table,
     stopping,
     stroke_file,
+    watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -199,7 +200,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(preflight_table.table(judged))
+            tell(preflight_table.table(judged), preflight_table.facts(judged))
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
@@ -382,7 +383,9 @@ def _stream(
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
-            outcome = loop.run(interruption)
+            with watching.live(lambda: watching.of_plan(loop), realtime) as ended:
+                outcome = loop.run(interruption)
+                ended(outcome.reason)
         finally:
             if len(loop.log):
                 made = execution.record_of(loop, outcome, provenance, realtime, reach)
