@@ -8,7 +8,7 @@ import numpy as np
 
 from dmpcli.admittance.compensation import Compensation
 from dmpcli.admittance.force_coupling import Filter, fast_filter
-from dmpcli.arrays import Floats
+from dmpcli.arrays import AnyArray, Floats
 from dmpcli.control import guards
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
@@ -27,8 +27,10 @@ from dmpcli.planning.plan import Plan, PlannedStroke
 from dmpcli.planning.preflight import Check
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION
 from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.simulation.mock import Plate, Scene
+from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
@@ -291,7 +293,11 @@ def watch(settings: ExecuteSettings) -> StopLimits:
 
 
 def record_of(
-    loop: PlanLoop, outcome: LoopOutcome, provenance: Provenance, realtime: bool
+    loop: PlanLoop,
+    outcome: LoopOutcome,
+    provenance: Provenance,
+    realtime: bool,
+    reach: Reach | None = None,
 ) -> Record:
     """Return the run as a record.
 
@@ -304,6 +310,8 @@ def record_of(
         What was known before.
     realtime : bool
         Lateness is a fact only where a clock ran: a simulated run is the same every time.
+    reach : Reach, optional
+        The arm whose joint angles follow from the poses where no driver told them.
     """
     facts = provenance.facts | {
         "reason": outcome.reason,
@@ -318,7 +326,39 @@ def record_of(
         facts["contact"] = asdict(contact(felt, loop.pressing.law.contact))
     if "strokes" in facts:
         facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
-    return Record(schemas.RUN, loop.log.columns(), replace(provenance, facts=facts))
+    columns = loop.log.columns()
+    joints = joints_of(columns, reach, loop.plan.period)
+    if joints:
+        arm = None if reach is None else reach.arm.name
+        facts["joints"] = {"arm": arm, "measured": JOINTS[0] in columns}
+    return Record(schemas.RUN, columns | joints, replace(provenance, facts=facts))
+
+
+def joints_of(
+    columns: Mapping[str, AnyArray], reach: Reach | None, period: float
+) -> dict[str, AnyArray]:
+    """Return the columns of the joint angles of a run: as told, else by the arm's kinematics.
+
+    Parameters
+    ----------
+    columns : dict of array
+        Of the run.
+    reach : Reach or None
+    period : float
+        s.
+
+    Returns
+    -------
+    dict of array
+        None where nothing is known of them, or the arm does not reach a pose.
+    """
+    told = {name: columns[name] for name in JOINTS if name in columns}
+    if told or reach is None:
+        return told
+    position = np.column_stack([columns[name] for name in POSITION])
+    rotation = from_euler(np.column_stack([columns[name] for name in EULER_ANGLES]))
+    q = reach.follow(position[None], rotation[None], period).joints[0]
+    return {} if np.isnan(q).any() else dict(zip(JOINTS, q.T, strict=False))
 
 
 def progress_of(ids: Sequence[str], drawn: Sequence[str]) -> dict[str, list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import EULER_ANGLES, EVENT, JOINTS, POSITION, WRENCH, suffixed
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -36,6 +36,10 @@ class Row:
     state, phase : str
     id : str or None
         The stroke that the set-point lies on; None on the way to, from and between strokes.
+    joints : array, shape (n,), or None
+        Actual, rad.
+    event : str
+        Outputs that were switched in this cycle.
     """
 
     t: float
@@ -50,6 +54,8 @@ class Row:
     state: str
     phase: str
     id: str | None = None
+    joints: Floats | None = None
+    event: str = ""
 
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
@@ -65,6 +71,10 @@ class RunLog:
         Whether the trajectory states an orientation; without one the planned angles are absent.
     sensed, coupled : bool
         Whether there is a sensor, and a force coupling.
+    joints : int
+        How many joint angles the arm tells; 0 where none.
+    switching : bool
+        Whether outputs are switched.
 
     Attributes
     ----------
@@ -72,13 +82,23 @@ class RunLog:
         ``clock`` is the loop's clock, which no file keeps.
     """
 
-    def __init__(self, oriented: bool = True, sensed: bool = False, coupled: bool = False) -> None:
+    def __init__(
+        self,
+        oriented: bool = True,
+        sensed: bool = False,
+        coupled: bool = False,
+        joints: int = 0,
+        switching: bool = False,
+    ) -> None:
         groups = dict.fromkeys(("clock", *_TIMES), 1)
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
         groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
-        self.rows = RowBuffer(groups, ("state", "phase", "id"))
+        self._joints = joints if joints <= len(JOINTS) else 0
+        groups |= {"joints": self._joints} if self._joints else {}
+        self._texts = ("state", "phase", "id", *([EVENT] if switching else []))
+        self.rows = RowBuffer(groups, self._texts)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
     def __len__(self) -> int:
@@ -99,10 +119,13 @@ class RunLog:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
             felt += (row.coupling,)
+        if self._joints:
+            told = row.joints is not None and len(row.joints) == self._joints
+            felt += (row.joints if told and row.joints is not None else np.nan,)
         times = (row.t, row.t_plan, row.deadline, row.lateness)
         self.rows.add(
             (clock, *times, *planned, *row.sent, *row.actual, *felt),
-            (row.state, row.phase, row.id or ""),
+            (row.state, row.phase, row.id or "", row.event)[: len(self._texts)],
         )
 
     def columns(self) -> dict[str, AnyArray]:
@@ -128,8 +151,14 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out |= _split(rows.numbers("wrench"), WRENCH, "")
     if "coupling" in rows.groups:
         out["coupling"] = rows.numbers("coupling")
+    if "joints" in rows.groups:
+        angles = rows.numbers("joints").reshape(len(rows), -1)
+        out |= dict(zip(JOINTS, angles.T, strict=False))
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
-    return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
+    for name in ("id", EVENT):
+        if name in rows.texts:
+            out[name] = np.array([word or None for word in rows.words(name)], dtype=object)
+    return out
 
 
 def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict[str, Any]:

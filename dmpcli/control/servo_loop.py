@@ -7,6 +7,7 @@ however late the loop is. Every cycle is logged, the last one too.
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from dmpcli.control.arrival import ArrivalMonitor
@@ -20,6 +21,7 @@ from dmpcli.control.cycle import (
 )
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
 from dmpcli.control.guards import LAG
+from dmpcli.control.outputs import OutputSwitch, failed
 from dmpcli.control.plan_cursor import PlanCursor
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.control.signals import Interruption
@@ -49,6 +51,8 @@ class PlanLoop(ControlLoop):
         Read once a cycle; what it returns ends the run.
     then : sequence of Plan
         What is drawn after `plan`, each from where the one before it rests.
+    outputs : OutputSwitch, optional
+        What switches outputs along the plans.
 
     Attributes
     ----------
@@ -58,6 +62,8 @@ class PlanLoop(ControlLoop):
         By how much more than its look-ahead the arm may lag at a stroke's end, s.
     plan : Plan
         The one that is drawn.
+    period, duration : float
+        Of its cycles, and of all plans, s.
     drawn : list of str
         Ids of the strokes that were drawn to their ends.
     pressing : ForceTracker or None
@@ -83,10 +89,12 @@ class PlanLoop(ControlLoop):
         touch: ForceInput | None = None,
         hindrance: Callable[[], DmpError | None] = lambda: None,
         then: Sequence[Plan] = (),
+        outputs: OutputSwitch | None = None,
     ) -> None:
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
         self.plan, self._then = plan, deque(then)
+        self.period, self.duration = plan.period, plan.period * sum(map(len, (plan, *then)))
         self.drawn: list[str] = []
         self.pressing: ForceTracker | None = touch.pressing if touch else None
         if self.pressing is not None and not self.STREAMS:
@@ -95,8 +103,10 @@ class PlanLoop(ControlLoop):
                 "whole plan by itself; leave mode=file out of --robot"
             )
         self._touch, self._limits = touch, limits
+        self._outputs, self._owed, self._switched = outputs, 0, ""
         self._draw(plan)
-        self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
+        sensed, pressed = touch is not None, self.pressing is not None
+        self.log = RunLog(plan.oriented, sensed, pressed, arm.joints, outputs is not None)
 
     def run(self, interruption: Interruption) -> LoopOutcome:
         """Go on until the arm rests at the end, or a reason to stop; the arm is stopped after.
@@ -116,7 +126,15 @@ class PlanLoop(ControlLoop):
         how, failure = self._run()
         if self._cursor.braking:
             how = how or "decelerated along the path"
-        return self._outcome(how, failure, DONE)
+        outcome = self._outcome(how, failure, DONE)
+        if self._outputs is None or not self._outputs.left:
+            return outcome
+        reason, failure = failed(outcome.reason, outcome.failure, self._outputs.left)
+        return replace(outcome, reason=reason, failure=failure)
+
+    def _leave(self) -> None:
+        if self._outputs is not None:
+            self._outputs.leave()
 
     @property
     def virtual(self) -> bool:
@@ -137,8 +155,15 @@ class PlanLoop(ControlLoop):
         if self._interruption.count > 1:
             raise StoppedAtOnce("stopped at once at the second signal")
         if self._interruption.count or self._hindrance() is not None:
+            self._switched += self._outputs.off() if self._outputs is not None else ""
             self._brake()
-        return self._setpoint(cycle)
+        setpoint = self._setpoint(cycle)
+        if self._outputs is not None and not self._cursor.waiting and not self._cursor.braking:
+            self._owed = self._owed + 1 if owed else 0
+            late = 0.0 if self._arm.info.queues else cycle.late
+            when = cycle.due + late + self._owed * self._period
+            self._outputs.reach(self.plan, self._cursor.index, when)
+        return setpoint
 
     @abstractmethod
     def _brake(self) -> None:
@@ -152,6 +177,8 @@ class PlanLoop(ControlLoop):
         """Go on until the last plan has ended, or the brake, and the arm stands still."""
         over = self._cursor.finished and (not self._then or self._cursor.braking)
         self._rested = over and self._rest.reached(cycle.state)
+        if self._outputs is not None and self._outputs.waiting:
+            self._rested = False  # the arm is on its way to where something is switched
         self._look(cycle.state)
         if self._rested:
             if not self._cursor.braking and self._last is not None:
@@ -211,6 +238,11 @@ class PlanLoop(ControlLoop):
         index, state = self._cursor.index, cycle.state
         draws = self.plan.draws_at(index)
         actual = (state.position, state.rotation)
+        switched, failure = self._switched, None
+        if self._outputs is not None and setpoint is not None:
+            now, self._switched = self._arm.clock.now() - self._begin, ""
+            done, failure = self._outputs.act(now)
+            switched = "; ".join(part for part in (switched, done) if part)
         self.log.add(
             state.t,
             Row(
@@ -227,8 +259,12 @@ class PlanLoop(ControlLoop):
                 state=state.mode,
                 phase=self._cursor.phase,
                 id=self.plan.id if draws else None,
+                joints=state.joints,
+                event=switched,
             ),
         )
+        if failure is not None:
+            raise failure
 
 
 class ServoLoop(PlanLoop):

@@ -17,6 +17,7 @@ from dmpcli.formats.motion import MotionStroke
 from dmpcli.messages import warn
 from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import log
 
 Poses = Callable[[Floats], tuple[Floats, Floats | None]]
@@ -45,6 +46,8 @@ class ProgramMoves:
         mm/s, rad/s and s; NaN where it is not said.
     marks : list of (int, str or None)
         Before which move a stroke begins, or None: ends.
+    switches : list of (int, str, bool)
+        After which move an output is switched, which, and whether on.
     frame : (int, str) or None
         The first line that names another frame than the robot's base, and the frame.
     """
@@ -56,6 +59,7 @@ class ProgramMoves:
     turn: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     marks: list[tuple[int, str | None]] = field(default_factory=list)
+    switches: list[tuple[int, str, bool]] = field(default_factory=list)
     frame: tuple[int, str] | None = None
 
     def statements(self, source: Source, comment: str) -> Iterator[tuple[int, str]]:
@@ -115,6 +119,10 @@ class ProgramMoves:
         if self.targets:
             self.move(line, self.targets[-1], seconds=seconds)
 
+    def switch(self, output: str, on: bool, ahead: int = 0) -> None:
+        """Take an output that is switched where the last move has led, or one that is to come."""
+        self.switches.append((len(self.targets) - 1 + ahead, output, on))
+
     def mark(self, comment: str) -> None:
         """Take what a comment says, if it is one of ours."""
         found = _MARK.fullmatch(comment.strip())
@@ -153,7 +161,13 @@ class ProgramMoves:
                 continue
             rows = np.arange(first, last + 1)[kept]
             R = None if rotation is None else rotation[rows]
-            stroke = MotionStroke(t[kept], position[rows], R, id=name or str(number + 1))
+            events = tuple(
+                OutputEvent(float(t[at - first]), output, on)
+                for at, output, on in self.switches
+                if first <= at <= last
+            )
+            name = name or str(number + 1)
+            stroke = MotionStroke(t[kept], position[rows], R, id=name, events=events)
             found.append(stroke)
         if not found:
             raise InputError(f"{self.name}: holds no moves that could be a stroke")
@@ -221,6 +235,20 @@ def lines_of(source: Source) -> list[str]:
 def spelled(name: str) -> str:
     """Return a stroke's name as a comment may hold it."""
     return re.sub(r"[^\w.+\-]+", "_", name) or "_"
+
+
+def output_number(name: str, letters: str, form: str) -> int:
+    """Return the number of an output that a language names by number.
+
+    Raises
+    ------
+    InputError
+        Its name is not those letters and a number.
+    """
+    found = re.fullmatch(rf"{letters}(\d{{1,4}})", name, re.ASCII)
+    if found is None:
+        raise InputError(f"output {name}: {form} numbers its outputs; call it {letters}1 or so")
+    return int(found[1])
 
 
 def identifier(name: str, most: int) -> str:

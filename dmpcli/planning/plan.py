@@ -13,6 +13,7 @@ from dmpcli.errors import InputError
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.spline import between, spline, window
 from dmpcli.spatial import rotations
+from dmpcli.spatial.output_events import OutputEvent
 
 Phase = Literal["approach", "stroke", "retract", "transfer", "stop"]
 Pose = tuple[Floats, Floats]
@@ -48,6 +49,8 @@ class PlannedStroke:
         Unit normal of the surface, to the tool's side.
     first_row : int
         Row of the file that holds the first sample, counted from 1.
+    events : tuple of OutputEvent
+        What is switched along it, on the time of `t`.
     """
 
     id: str
@@ -56,6 +59,7 @@ class PlannedStroke:
     rotation: Floats | None = None
     normal: Floats | None = None
     first_row: int = 1
+    events: tuple[OutputEvent, ...] = ()
 
     def pose(self, index: int) -> Pose:
         """Position and rotation of a sample; the stroke must state an orientation."""
@@ -103,6 +107,8 @@ class Plan:
         The stroke's.
     legs : tuple of (str, int)
         Phases in order, each with the number of its first set-point.
+    events : tuple of (float, OutputEvent)
+        What is switched, by the number of the set-point or between two.
     """
 
     period: float
@@ -115,6 +121,7 @@ class Plan:
     oriented: bool
     id: str
     legs: tuple[tuple[Phase, int], ...]
+    events: tuple[tuple[float, OutputEvent], ...] = ()
 
     def __len__(self) -> int:
         return len(self.t)
@@ -241,7 +248,11 @@ def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> 
     t = np.minimum(stroke.t[0] + np.arange(cycles + 1) * step, stroke.t[-1])
     position, turned = _resample(stroke.t, stroke.position, rotation, t)
     normal = None if stroke.normal is None else _unit(_linear(stroke.t, stroke.normal, t))
-    return replace(stroke, t=t - stroke.t[0], position=position, rotation=turned, normal=normal)
+    begun = float(stroke.t[0])
+    events = tuple(replace(event, t=event.t - begun) for event in stroke.events)
+    return replace(
+        stroke, t=t - begun, position=position, rotation=turned, normal=normal, events=events
+    )
 
 
 def joined(
@@ -287,6 +298,10 @@ def joined(
         oriented,
         sampled.id,
         tuple((leg.phase, first) for leg, first in zip(parts, numbers, strict=False)),
+        tuple(
+            (lead + float(np.interp(event.t, sampled.t, np.arange(len(sampled.t)))), event)
+            for event in sampled.events
+        ),
     )
 
 

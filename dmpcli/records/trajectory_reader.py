@@ -11,6 +11,8 @@ from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.record import Record
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.trajectory import Trajectory
 
@@ -29,11 +31,14 @@ class StoredTrajectory(Trajectory):
         Row of the file that holds the first sample, counted from 1.
     facts : dict
         What the file says beside it; of a batch, with the start, goal and normal of its pair.
+    events : tuple of OutputEvent
+        What is switched along it.
     """
 
     id: str = ""
     first_row: int = 1
     facts: dict[str, Any] = field(default_factory=dict)
+    events: tuple[OutputEvent, ...] = ()
 
 
 def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
@@ -85,7 +90,17 @@ def stored(
         name,
         int(rows[0]) + 1 if len(rows) else 1,
         facts,
+        _events(record, rows, t),
     )
+
+
+def _events(record: Record, rows: Integers, t: Floats) -> tuple[OutputEvent, ...]:
+    if schemas.EVENT not in record.columns or record.schema is not schemas.TRAJECTORY:
+        return ()
+    try:
+        return output_events.read(record.columns[schemas.EVENT][rows].tolist(), t)
+    except output_events.NotPlacedError as error:
+        raise InputError(f"{_of(record)}column {schemas.EVENT!r}, {error}") from None
 
 
 def _of(record: Record) -> str:

@@ -10,10 +10,12 @@ from dmpcli.control import (
     execution,
     execution_plan,
     guards,
+    outputs,
     ownership,
     preflight_table,
     stopping,
     stroke_file,
+    watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -23,7 +25,7 @@ from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
-from dmpcli.instruments.protocols import PlanPlayer
+from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
@@ -73,6 +75,8 @@ class ExecutionRequest:
         Check, and move nothing.
     allow_file_mode : bool
         Let the controller play the plan, though the arm draws on if the link is lost.
+    ignore_events : bool
+        Draw without switching the outputs that the file asks for.
     """
 
     trajectory: str | Source
@@ -88,6 +92,7 @@ class ExecutionRequest:
     force: bool = False
     dry_run: bool = False
     allow_file_mode: bool = False
+    ignore_events: bool = False
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     repeatable = workcell.repeatable(addresses)
     check_output(request, repeatable)
     tool_file = None if request.tool is None else file_io.read(request.tool)
-    batch = stroke_file.find(request.trajectory, request.ids)
+    batch = _found(request)
     _warn_of(batch, _name(request.trajectory))
     coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
@@ -171,6 +176,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         tool=held,
     )
     guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
+    outputs.check(bench.robot, outputs.names_of(batch.strokes))
     if bench.note:
         tell(bench.note)
     robot = bench.robot
@@ -181,7 +187,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
     try:
-        arm = ReadyArm(robot, robot.open(), clock)
+        arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
@@ -189,7 +195,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(preflight_table.table(judged))
+            tell(preflight_table.table(judged), preflight_table.facts(judged))
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
@@ -197,7 +203,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
         provenance.facts.update(execution.facts_of(arm, coupling, settings))
-        outcome, made = _stream(loop, provenance, realtime, keeper)
+        outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
         closing = guards.leave(robot.close, bench.sensor.close, lock.release)
     with stopping.outranking(lambda: outcome.stop):
@@ -212,6 +218,17 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         if closing is None and execution_plan.lifts(batch, settings):
             left = execution_plan.rest_of(batch, loop.drawn)
         return Execution(judged, _finished(outcome, made, request, left))
+
+
+def _found(request: ExecutionRequest) -> StrokeSelection:
+    """Return the strokes that are to be drawn, with the outputs that they are to switch."""
+    batch = stroke_file.find(request.trajectory, request.ids)
+    names = outputs.names_of(batch.strokes)
+    if not request.ignore_events:
+        return batch
+    if names:
+        warn(f"{', '.join(names)}: not switched, as --ignore-events asks")
+    return stroke_file.without_events(batch)
 
 
 def _name(trajectory: str | Source) -> str:
@@ -291,7 +308,12 @@ def _loop(
         from dmpcli.control.playback import Playback
 
         kind = Playback
-    return kind(plans[0], limits_of(settings), watch, arm, touch, keeper.hindrance, plans[1:])
+    switch = None
+    if any(plan.events for plan in plans):
+        assert isinstance(arm.servo, OutputSwitching)
+        switch = outputs.OutputSwitch(arm.servo, settings.period, arm.info.lookahead)
+    limits = limits_of(settings)
+    return kind(plans[0], limits, watch, arm, touch, keeper.hindrance, plans[1:], switch)
 
 
 def _tool(bench: Workcell, tool_file: Source | None) -> Tool:
@@ -321,6 +343,8 @@ def _provenance(
         "sensor": workcell.in_provenance(request.sensor),
     }
     options |= {"coupling": "force" if request.presses else None}
+    if request.ignore_events:
+        options["ignore_events"] = True
     facts: dict[str, Any] = {"simulated": simulated}
     if execution_plan.lifts(batch, settings):
         options["id"] = list(request.ids) or None
@@ -332,7 +356,11 @@ def _provenance(
 
 
 def _stream(
-    loop: PlanLoop, provenance: Provenance, realtime: bool, keeper: RunOutput
+    loop: PlanLoop,
+    provenance: Provenance,
+    realtime: bool,
+    keeper: RunOutput,
+    reach: Reach | None,
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
@@ -341,10 +369,12 @@ def _stream(
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
-            outcome = loop.run(interruption)
+            with watching.live(lambda: watching.of_plan(loop), realtime) as ended:
+                outcome = loop.run(interruption)
+                ended(outcome.reason)
         finally:
             if len(loop.log):
-                made = execution.record_of(loop, outcome, provenance, realtime)
+                made = execution.record_of(loop, outcome, provenance, realtime, reach)
                 keeper.keep(made, outcome.error())
             else:
                 keeper.drop()

@@ -85,6 +85,9 @@ def import_file(
             f"{name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
             f"NAME, or put {ID} into the name of the output for a file of each"
         )
+    for one in strokes:
+        if one.events:
+            tell(f"{name}: {_switched(one)}")
     said: dict[str, Any] = {"format": kind}
     if form is not None:
         said["layout"] = form.as_options()
@@ -294,10 +297,12 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     t = np.interp(np.arange(ends[-1] + 1), ends, one.t)
     t = t[np.concatenate([[True], np.diff(t) > 0.0])]
     position = np.column_stack([np.interp(t, one.t, axis) for axis in one.position.T])
-    R = None if one.rotation is None else np.empty((len(t), 3, 3))
-    for first in range(0, len(t), _AT_ONCE) if R is not None else ():
-        part = slice(first, first + _AT_ONCE)
-        R[part] = interpolate(one.t, np.asarray(one.rotation), t[part])
+    R = None
+    if one.rotation is not None:
+        R = np.empty((len(t), 3, 3))
+        for first in range(0, len(t), _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            R[part] = interpolate(one.t, np.asarray(one.rotation), t[part])
     return replace(one, t=t, position=position, rotation=R)
 
 
@@ -314,6 +319,20 @@ def demonstration(
         columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
     origin = Provenance("import", options, tuple(inputs))
     return Record(schemas.DEMONSTRATION, columns, origin)
+
+
+def _switched(one: MotionStroke) -> str:
+    """Say what a stroke switches, which no demonstration holds, and how to have it again."""
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(one.position, axis=0), axis=1))])
+    words = []
+    for event in one.events[:10]:
+        place = np.interp(event.t, one.t, gone)
+        words.append(f"--event {'on' if event.on else 'off'}@{place:.4f}mm:{event.output}")
+    more = "" if len(one.events) <= 10 else f" and {len(one.events) - 10} more"
+    return (
+        f"stroke {one.id!r} switches outputs, and a demonstration holds none: generalize "
+        f"{' '.join(words)}{more} does"
+    )
 
 
 def _safe(name: str) -> str:
