@@ -9,10 +9,11 @@ from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import SETTLED_TIME, ForceInput, ForceTracker
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
+from dmpcli.planning import transfers
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.rotations import from_euler
 from tests.control.fake_sensors import BatchSensor
-from tests.control.streaming_fakes import START, plan, stroke
+from tests.control.streaming_fakes import START, WIDE, plan, stroke
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)
@@ -218,3 +219,23 @@ def test_a_plan_that_lifts_off_releases_e():
     for i in range(10):
         press.displace(250.0 + i, np.zeros(6))
     assert press.e > pulled
+
+
+def test_on_the_way_off_the_work_the_displacement_goes_with_the_way_that_is_left():
+    source = stroke(normal=UP)
+    led = transfers.plans(
+        [source], PERIOD, 1.0, WIDE, (source.position[0], source.rotation[0]), True,
+        transfers.TransferOptions(20.0, 100.0, 50.0, 20.0),
+    )  # fmt: skip
+    made = next(iter(led))
+    press = ForceTracker(law(), fast_filter(5.0, PERIOD), made)
+    for _ in range(10):
+        press.displace(0.0, push(UP, 2.0))
+    whole = press.leave(made.last)
+    assert whole[:2].tolist() == [0.0, 0.0]
+    assert whole[2] < 0.0
+    risen = made.position[made.last :, 2] - made.position[made.last, 2]
+    assert risen.max() == pytest.approx(20.0)
+    for index in range(made.last, len(made), 7):
+        left = 1.0 - risen[index - made.last] / 20.0
+        assert press.leave(index) == pytest.approx(left * whole, abs=1e-9)
