@@ -264,3 +264,16 @@ def test_the_same_stroke_drawn_slower_teaches_the_same_to_the_paper(model):
     np.testing.assert_allclose(both.weights, alone.weights, atol=0.01 * size)
     np.testing.assert_allclose(both.start, alone.start, atol=1e-6)
     np.testing.assert_allclose(both.goal, alone.goal, atol=1e-6)
+
+
+def test_what_smoothing_took_off_is_the_root_mean_square_of_the_distances():
+    stroke = paper_stroke(801)
+    rng = np.random.default_rng(3)
+    noisy = Trajectory(
+        stroke.t, stroke.position + 0.2 * rng.standard_normal((801, 3)), stroke.rotation
+    )
+    found = fit([noisy], FitOptions()).prepared[0]
+    off = np.linalg.norm(found.stroke.position - found.recorded, axis=1)
+    assert found.removed == pytest.approx(np.sqrt(np.mean(off**2)))
+    # Nearly all of the noise of three axes.
+    assert found.removed == pytest.approx(0.2 * np.sqrt(3.0), rel=0.06)
