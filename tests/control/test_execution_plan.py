@@ -1,5 +1,6 @@
 """Messages and facts of a run of many strokes stay short however many there are."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -45,6 +46,18 @@ def test_of_a_thousand_that_fail_a_few_are_named():
     with pytest.raises(RefusedError, match=r"^stroke 0: speed 9 .*1000 of 1000 strokes fail") as e:
         execution_plan.refuse_any(judged)
     assert str(e.value).endswith("0, 0, 0, 0, 0 and 995 more")
+
+
+def test_the_others_that_fail_are_named_beside_the_first():
+    bad = Check("speed", 9.0, 1.0, "mm/s", 0.5, 7, "slow it down")
+    of = {name: dataclasses.replace(plan(), id=name) for name in "abcd"}
+    judged = [CheckedPlan(of[name], [bad] if name in "bd" else []) for name in "abcd"]
+    with pytest.raises(RefusedError, match=r"^stroke b: speed 9 .*; 2 of 4 strokes fail: b, d$"):
+        execution_plan.refuse_any(judged)
+    with pytest.raises(RefusedError) as alone:
+        execution_plan.refuse_any(judged[:3])
+    assert "strokes fail" not in str(alone.value)
+    execution_plan.refuse_any([judged[0], judged[2]])
 
 
 def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():

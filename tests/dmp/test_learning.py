@@ -277,3 +277,31 @@ def test_what_smoothing_took_off_is_the_root_mean_square_of_the_distances():
     assert found.removed == pytest.approx(np.sqrt(np.mean(off**2)))
     # Nearly all of the noise of three axes.
     assert found.removed == pytest.approx(0.2 * np.sqrt(3.0), rel=0.06)
+
+
+def test_strokes_of_differing_length_teach_the_paper_the_stroke_of_their_mean_length():
+    """Lengths of 100 and 140 mm, one wave height: in u they are brought to 120 mm, v stays."""
+    options = FitOptions(learning="paper", regression="ridge")
+
+    def drawn(length):
+        t = np.linspace(0.0, 6.0, 501)
+        u = minimum_jerk(t / 6.0)
+        return Trajectory(t, np.stack([length * u, 30 * np.sin(2 * np.pi * u), 0 * u], axis=1))
+
+    both, alone = (fit([drawn(x) for x in of], options) for of in ([100.0, 140.0], [120.0]))
+    size = np.abs(alone.skill.weights).max()
+    np.testing.assert_allclose(both.skill.weights, alone.skill.weights, atol=1e-6 * size)
+    assert both.skill.goal[0] == pytest.approx(120.0, abs=1e-3)
+    # Each is shown in the length in which it was drawn.
+    for reproduction, length in zip(both.reproductions, (100.0, 140.0), strict=True):
+        assert np.ptp(reproduction.demonstrated[:, 0]) == pytest.approx(length, abs=0.01)
+        assert reproduction.reproduced[-1, 0] == pytest.approx(length, abs=0.1)
+        assert height(reproduction) == pytest.approx(60.0, abs=3.0)
+
+
+def test_the_largest_angle_between_what_was_shown_and_what_is_drawn_is_told():
+    for given in ([paper_stroke(turning=True)], [paper_stroke(turning=True)] * 2):
+        for told in fit(given, FitOptions()).reproductions:
+            assert 0.0 < told.angle < np.radians(1.0)
+    still = fit([Trajectory(paper_stroke().t, paper_stroke().position)], FitOptions())
+    assert not still.reproductions[0].angle

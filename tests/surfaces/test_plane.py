@@ -152,7 +152,8 @@ def test_the_charts_of_some_pairs_are_theirs(closed):
     uvw = rng.normal(size=(5, 4, 3))
     lifted = charts.lift(uvw)
     assert charts.coordinates(lifted.position) == pytest.approx(uvw)
-    assert charts.over(lifted.position).all()
+    over = charts.over(lifted.position)
+    assert (over.shape, over.dtype, over.all()) == ((5, 4), bool, True)
     assert not lifted.outside.any()
     if not closed:
         assert charts.goals[:, 1] == pytest.approx(0.0, abs=1e-9)
