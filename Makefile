@@ -15,6 +15,7 @@
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
+#   make mutants     small faults in the mathematics and the loops: which no test would notice
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -41,7 +42,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers judges faults \
-    soak mutations cluster-demo samples pictures schemas clean FORCE
+    soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -144,6 +145,13 @@ MUTATIONS ?= 2000
 
 mutations: $(VENV)/installed
 	$(BIN)/python -m benchmarks.mutations --count $(MUTATIONS) --keep $(OUT)/mutations
+
+# docs/mutants.md; SEED=N draws the same ones again, and goes on where a run was stopped.
+MUTANTS ?= 500
+JOBS    ?= 1
+
+mutants: $(VENV)/installed
+	nice -n 19 $(BIN)/python -m tools.mutants --count $(MUTANTS) --jobs $(JOBS) $(if $(SEED),--seed $(SEED))
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 
