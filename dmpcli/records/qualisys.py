@@ -11,6 +11,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.text_lines import TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 LAYOUT = "qualisys"
@@ -31,7 +32,7 @@ def read(source: Source) -> Table:
     InputError
         There are no rows, or no names for them.
     """
-    every = [line.rstrip("\t ") for line in tables.text_lines(source)]
+    every = [line.rstrip("\t ") for line in every_line(source)]
     at = next((i for i, line in enumerate(every[:40]) if i and _is_row(line)), None)
     if at is None:
         raise InputError(f"{source.name}: begins as an export of Qualisys, but holds no rows")
@@ -42,7 +43,8 @@ def read(source: Source) -> Table:
     kept = [i for i in range(at, len(every)) if every[i]]
     body = "\n".join(every[i] for i in kept).encode()
     lines = np.array(kept, dtype=np.int64) + 1
-    columns = tables.body_columns(body, names, b"\t", lines, source.name)
+    found = TextLines(body, 0, len(body), lines)
+    columns = tables.body_columns(found, names, b"\t", source.name)
     remarks = []
     if "Time" not in names:
         rate = float(said.get("FREQUENCY", ["0"])[0] or 0.0)

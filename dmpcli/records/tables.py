@@ -447,21 +447,6 @@ def _is_passed_over(line: str) -> bool:
     return line.strip()[:1] in ("", "#")
 
 
-def text_lines(source: Source) -> list[str]:
-    """Lines of a text file, however they end; without the empty ones at its end.
-
-    Raises
-    ------
-    InputError
-        It is not text.
-    """
-    try:
-        text = source.content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{source.name}: is not text in UTF-8") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-
-
 def _complaint(error: str, lines: Integers, expected: int) -> str:
     """Say what Arrow found wrong with a table's shape, by the line of the file."""
     found = re.search(r"Row #(\d+): Expected \d+ columns, got (\d+)", error)

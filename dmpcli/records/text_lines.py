@@ -121,3 +121,18 @@ def _looked_at(content: bytes, end: int) -> tuple[int, bool]:
         # What ends the text is no line's end: a line begins after each.
         doubtful = doubtful or bool(_DOUBTFUL[letters[starts]].any())
     return count, doubtful
+
+
+def every_line(source: Source) -> list[str]:
+    """Lines of a text file, however they end; without the empty ones at its end.
+
+    Raises
+    ------
+    InputError
+        It is not text.
+    """
+    try:
+        text = source.content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source.name}: is not text in UTF-8") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")

@@ -10,6 +10,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.text_lines import TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 LAYOUT = "trc"
@@ -30,7 +31,7 @@ def read(source: Source) -> Table:
     InputError
         A line of its head is missing.
     """
-    every = tables.text_lines(source)
+    every = every_line(source)
     at = next((i for i, line in enumerate(every[:8]) if line.startswith("Frame#")), None)
     if at is None or at < 2 or at + 2 >= len(every):
         raise InputError(f"{source.name}: begins as a TRC file, but has no line 'Frame#  Time ...'")
@@ -47,5 +48,6 @@ def read(source: Source) -> Table:
     kept = [i for i in range(at + 2, len(every)) if every[i].strip()]
     body = "\n".join("\t".join(every[i].split("\t")[: len(names)]) for i in kept).encode()
     lines = np.array(kept, dtype=np.int64) + 1
-    columns = tables.body_columns(body, names, b"\t", lines, source.name)
+    found = TextLines(body, 0, len(body), lines)
+    columns = tables.body_columns(found, names, b"\t", source.name)
     return Table(source.name, columns, lines)

@@ -15,6 +15,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.text_lines import TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 LAYOUT = "vicon"
@@ -43,7 +44,7 @@ def read(source: Source) -> Table:
     InputError
         There is no line ``Frame, Sub Frame``, or no rate above 0.
     """
-    every = tables.text_lines(source)
+    every = every_line(source)
     separator = ";" if every[0].count(";") > every[0].count(",") or ";" in every[2] else ","
     rate = float(every[1].strip(' ,;\t"'))
     at = next((i for i, line in enumerate(every[:12]) if line.startswith("Frame")), None)
@@ -60,7 +61,8 @@ def read(source: Source) -> Table:
     kept = _until_blank(every, at + 2)
     body = "\n".join(every[i] for i in kept).encode()
     lines = np.array(kept, dtype=np.int64) + 1
-    columns = tables.body_columns(body, names, separator.encode(), lines, source.name)
+    found = TextLines(body, 0, len(body), lines)
+    columns = tables.body_columns(found, names, separator.encode(), source.name)
     frames = Table(source.name, columns, lines).numbers(names[0])
     columns["Time"] = frames / rate
     remarks.append(f"time counted by the frames at {rate:g} Hz")
