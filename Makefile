@@ -128,7 +128,8 @@ JUDGES := $(OUT)/judges/venv
 judges:
 	@sh tools/set_up.sh "$(PYTHON)" "$(JUDGES)" "$(LOCK)" "$(OUT)"
 	$(JUDGES)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/judges.txt
-	DMPCLI_JUDGES=required $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
+	@sh tools/linuxcnc.sh $(OUT)/judges/linuxcnc
+	DMPCLI_JUDGES=required DMPCLI_LINUXCNC=$(OUT)/judges/linuxcnc $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
 	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py
 
 # One seed replays one failure: python -m tests.faults --seed N.
