@@ -63,7 +63,6 @@ def shared(tmp_path_factory):
         ended("generalize", "skill.json", "-o", "batch", "--pairs", "pairs.csv", *ease)
         ended("execute", "traj.parquet", "-o", "run.parquet")
         ended("export", "trajectory.parquet", "-o", "bag", "--format", "ros2")
-        ended("calibrate", "-o", "tool.json")
     finally:
         os.chdir(here)
     return folder
@@ -120,7 +119,7 @@ def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):
 
 
 def test_nothing_that_looks_like_an_example_stands_outside_of_one():
-    """A line to be typed stands in a fence of sh, where it is run; a synopsis says that it is text."""
+    """What is to be typed stands in a fence of sh, and is run; a synopsis says that it is text."""
     missed = []
     for page in PAGES:
         text = page.read_text()

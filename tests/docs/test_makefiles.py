@@ -34,7 +34,7 @@ def test_the_batch_that_users_copy(tmp_path):
     assert (folder / "out" / "run.parquet").exists()
     assert "dmpcli generalize" in (folder / "out" / "batch.log").read_text()
     assert "may be executed" in make(folder, "all").stdout
-    assert "up to date" in make(folder, "run").stdout
+    assert "Nothing to be done" in make(folder, "run").stdout
     # A pair that is wrong stops the batch where nothing is to be skipped.
     draw = "DRAW=--ease-in 0.5 --ease-out 0.5"
     (folder / "pairs.csv").touch()
