@@ -40,6 +40,7 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+DRAWN_ON = ("drawn_on", "surface_sha256")
 
 
 def suffixed(names: tuple[str, ...], suffix: str) -> tuple[str, ...]:
