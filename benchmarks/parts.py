@@ -51,7 +51,7 @@ def parts(folder: Path, count: int) -> Path:
                 file.write_bytes(b"" if i % 2 else b"solid cut off\nfacet normal 0 0")
         elif not file.exists():
             trimesh.Trimesh(V, F, process=False).export(file)
-        start, goal = rng.uniform(-35, -25, 2), rng.uniform(-8, 8, 2) + [30.0, -30.0]
+        start, goal = rng.uniform(-35, -25, 2), rng.uniform(-8, 8, 2) + np.array([30.0, -30.0])
         ends = [*start, height(*start), *goal, height(*goal)]
         pose = " ".join(
             f"{v:.4f}" for v in (*rng.uniform(-300, 300, 3), *rng.uniform(-0.3, 0.3, 3))
@@ -122,9 +122,7 @@ def main() -> None:
     for name in ("stopped", "first", "kept", "one", "cache"):
         shutil.rmtree(folder / name, ignore_errors=True)
     jobs, cache = ("--jobs", "2"), ("--surface-cache", str(folder / "cache"))
-    print(
-        f"| {count} STL files of {2 * (SIDE - 1) ** 2} faces, one pair each | wall s | CPU s | MiB |"
-    )
+    print(f"| {count} STL files, {2 * (SIDE - 1) ** 2} faces, one pair | wall s | CPU s | MiB |")
     print("| --- | ---: | ---: | ---: |")
     half = max(1, count // 32)
     rows = {

@@ -10,7 +10,7 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.batch.cut import Cut, by_site, in_order
 from dmpcli.batch.dataset_folder import Folder
-from dmpcli.batch.part import Job, Outcome, Part, file_of
+from dmpcli.batch.part import Job, Outcome, Part
 from dmpcli.batch.site import PairSites, SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.copies import ends
@@ -22,6 +22,9 @@ from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Record
 from dmpcli.records.schemas import OK
 from dmpcli.surfaces.plane import Plane, pair_charts
+
+MOST_IN_ONE = 4000
+"""Parts that lie in one folder; more are put into several."""
 
 _AT_ONCE = 100_000
 """Pairs whose charts are laid at once."""
@@ -107,6 +110,7 @@ class Batch:
     most_sites: int = 16
 
     def __post_init__(self) -> None:
+        self.job = replace(self.job, nested=self.cut.count > MOST_IN_ONE)
         self._admitted = self.table.good
         self._outcomes: dict[int, Outcome] = {}
 
@@ -164,12 +168,14 @@ class Batch:
         InputError
             The folder cannot be written.
         """
-        folder = Folder(self.job)
+        folder = Folder(self.job, f"{self.shard.index}-of-{self.shard.count}")
         kept = folder.open(self.sizes, self.shard.whole, self._hashes)
         summary = Summary(kept=len(kept))
         try:
             for outcome in self._all(kept, draw):
                 self._note(outcome, self.sizes[outcome.number], summary)
+                if outcome.number not in kept:
+                    folder.note(outcome)
                 advance(self.sizes[outcome.number])
         finally:
             folder.leave()
@@ -202,7 +208,7 @@ class Batch:
     def _table(self) -> Record:
         """Return the table of pairs with what became of each; one row for each piece of a split."""
         good = self.table.good
-        names = [file_of(number) for number in range(self.cut.count)]
+        names = [self.job.file_of(number) for number in range(self.cut.count)]
         numbers = self.cut.part
         files = [names[n] if drawn else "" for n, drawn in zip(numbers.tolist(), good, strict=True)]
         ids, pairs, lasting = self.table.ids, self._ends(good), self._lasting(good)
@@ -299,7 +305,7 @@ class Batch:
     def _manifest(self) -> dict[str, Any]:
         entries = [
             manifest.Entry(
-                file=file_of(number),
+                file=self.job.file_of(number),
                 pairs=size,
                 rows=self._outcomes[number].rows,
                 bytes=self._outcomes[number].size,

@@ -251,7 +251,7 @@ def _compared(batch: BatchFolder) -> list[str]:
                 f"{part}: has {size} bytes, {file_io.MANIFEST} says {entry.bytes}: it is damaged "
                 "or of another batch; draw the batch again"
             )
-    there = {file.name for file in batch.folder.glob(file_io.PART)}
+    there = set(file_io.parts_of(batch.folder))
     more = sorted(there - listed)
     if not more:
         return []

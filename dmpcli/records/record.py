@@ -1,10 +1,11 @@
 """A record: one Parquet file between the stages, its columns as arrays and its provenance."""
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -14,7 +15,7 @@ from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import parquet, schemas, untrusted
 from dmpcli.records.columns import TYPES, columns_of, dtype_of
-from dmpcli.records.file_io import PART, TABLE, Source
+from dmpcli.records.file_io import TABLE, Source, parts_of
 from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
 from dmpcli.records.untrusted import decoder
@@ -370,19 +371,41 @@ def _is_number(value: object) -> bool:
     return type(value) in (int, float) and bool(np.isfinite(value))  # type: ignore[call-overload]
 
 
+_FOOTER = 8
+"""Bytes at the end of a Parquet file: the length of its footer, and its mark."""
+
+
+def _may_be_ours(stream: BinaryIO) -> bool:
+    """Tell a file with our metadata, or a damaged or empty one; without parsing its footer."""
+    if stream.read(4) != parquet.MAGIC:
+        stream.seek(0)
+        return stream.read(1) == b""
+    end = stream.seek(0, os.SEEK_END)
+    stream.seek(max(0, end - _FOOTER))
+    tail = stream.read()
+    size = int.from_bytes(tail[:4], "little")
+    if tail[4:] != parquet.MAGIC or not 0 < size <= end - _FOOTER:
+        return True
+    stream.seek(end - _FOOTER - size)
+    # As Thrift's compact protocol writes the key: a string field, its length, its letters.
+    return b"\x18" + bytes([len(KEY)]) + KEY in stream.read(size)
+
+
 def foreign_parts(folder: Path) -> list[str]:
     """Names of files in a dataset folder that stand where ours would, but are not ours.
 
     A damaged Parquet file, or an empty one, counts as ours: a power cut can leave such parts.
     """
     foreign = []
-    for file in sorted([*folder.glob(PART), *folder.glob(TABLE)]):
+    names = [] if not folder.is_dir() else [*parts_of(folder), TABLE]
+    for file in (folder / name for name in names):
+        if not file.is_file():
+            continue
         try:
-            with untrusted.decoding(str(file)):
-                ours = KEY in (pq.read_schema(file).metadata or {})
-        except InputError:
             with file.open("rb") as stream:
-                ours = stream.read(4) in (b"", parquet.MAGIC)
+                ours = _may_be_ours(stream)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror}") from None
         if not ours:
-            foreign.append(file.name)
+            foreign.append(file.relative_to(folder).as_posix())
     return foreign

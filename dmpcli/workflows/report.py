@@ -194,12 +194,13 @@ def _batch(
         return DocumentPart(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
     pairs = records.decode(file_io.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
-    strokes = []
+    strokes, ids = [], []
     for name in batch.files:
         part = records.decode(file_io.read(folder / name), schemas.TRAJECTORY)
         with about(part.name):
             strokes += strokes_of(part, label, normal, known)
-    return DocumentPart(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states)
+        ids += list(dict.fromkeys(part.columns["id"]))
+    return DocumentPart(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states, ids=ids)
 
 
 def _ground(read: SurfaceInput) -> tuple[ReportSurface, Row, Floats | None]:
@@ -253,9 +254,8 @@ def _placed_apart(parts: list[DocumentPart], grounds: SiteGrounds) -> list[Docum
     done = []
     for part in parts:
         strokes = list(part.strokes)
-        if part.schema == schemas.PAIRS.name and strokes:
-            ids = [one.label.removeprefix(f"{part.name}[").removesuffix("]") for one in strokes]
-            on = grounds.of(ids)
+        if part.ids:
+            on = grounds.of(part.ids)
             for number in np.unique(on).tolist():
                 rows = np.flatnonzero(on == number).tolist()
                 some = placed([strokes[i] for i in rows], grounds.ground(number), reference)
