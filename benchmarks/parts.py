@@ -8,7 +8,6 @@ the largest sum over all processes (proportional set sizes, so that shared pages
 
 import filecmp
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -21,6 +20,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import trimesh
 
+from benchmarks.batches import family, used
 from benchmarks.cluster_demo import BIN
 
 HALF, SIDE, BAD = 100.0, 159, 10
@@ -81,15 +81,15 @@ def memory_of(pid: int) -> int:
 
 def measured(words: list[str], stop_at: Path | None = None, parts: int = 0) -> tuple[float, ...]:
     """Run a command; wall s, processor s, largest memory in MiB."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begin = time.perf_counter()
     process = subprocess.Popen(words, stderr=subprocess.DEVNULL)
-    largest = 0
+    largest, spent = 0, {0: 0.0}
 
     def watch() -> None:
         nonlocal largest
         while process.poll() is None:
             largest = max(largest, memory_of(process.pid))
+            spent.update({pid: used(pid)[0] for pid in family(process.pid)})
             time.sleep(0.2)
 
     watcher = threading.Thread(target=watch)
@@ -100,9 +100,7 @@ def measured(words: list[str], stop_at: Path | None = None, parts: int = 0) -> t
         process.send_signal(signal.SIGINT)
     process.wait()
     watcher.join()
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return time.perf_counter() - begin, used, largest / 2**20
+    return time.perf_counter() - begin, sum(spent.values()), largest / 2**20
 
 
 def alike(one: Path, other: Path) -> bool:
@@ -134,8 +132,8 @@ def main() -> None:
         "with the cache": measured(command(folder, table, "kept", *jobs, *cache)),
         "one job": measured(command(folder, table, "one")),
     }
-    for name, (wall, used, memory) in rows.items():
-        print(f"| {name} | {wall:.1f} | {used:.1f} | {memory:.0f} |", flush=True)
+    for name, (wall, spent, memory) in rows.items():
+        print(f"| {name} | {wall:.1f} | {spent:.1f} | {memory:.0f} |", flush=True)
     same = all(alike(folder / "one", folder / name) for name in ("stopped", "first", "kept"))
     status = pq.read_table(folder / "one" / "pairs.parquet")["status"].to_pylist()
     named = sum(f"stl/{i}.stl" in said for i, said in enumerate(status) if said != "ok")

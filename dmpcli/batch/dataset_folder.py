@@ -6,9 +6,10 @@ with the same inputs and options goes on from them: each part's metadata say wha
 
 import contextlib
 import json
-from collections.abc import Callable, Container, Iterable
+import os
+from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -38,20 +39,47 @@ class Folder:
         self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
         self._own = () if job.prepare is None else tuple(job.provenance.facts)
         self._ledger = Ledger(self.path, self._expected, share)
+        self._whole = True
+        self._there: dict[str, os.stat_result] = {}
+        self._told: dict[str, Outcome] = {}
+        self._stale: set[str] = set()
+        self._table: tuple[Path, BinaryIO, record.GrowingRecord] | None = None
 
-    def open(
-        self, numbers: Iterable[int], whole: bool, hashes: Callable[[int], list[list[str | None]]]
-    ) -> dict[int, Outcome]:
-        """Make room for these parts, and return the outcomes of those that are already there.
+    def open(self, whole: bool) -> None:
+        """Make room for a batch, and look what is there.
 
         What a finished batch ends with goes first, so that nobody takes the folder for one.
 
         Parameters
         ----------
+        whole : bool
+            Whether all parts of the batch are to be drawn, and not a share of them.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        self._whole = whole
+        with self._writing():
+            self.path.mkdir(exist_ok=True)
+            (self.path / file_io.MANIFEST).unlink(missing_ok=True)
+            (self.path / file_io.TABLE).unlink(missing_ok=True)
+            if whole:
+                self._tidy(None)
+            self._there = file_io.parts_of(self.path)
+            self._told = self._ledger.read(self._there)
+            self._stale = set(self._there)
+
+    def kept(
+        self, numbers: Iterable[int], hashes: Callable[[int], list[list[str | None]]]
+    ) -> dict[int, Outcome]:
+        """Return the outcomes of those parts that are already there; what is left of others goes.
+
+        Parameters
+        ----------
         numbers : iterable of int
             Of the parts.
-        whole : bool
-            Whether these are all parts of the batch: then other parts are stale, and go.
         hashes : callable
             Returns the hashes of the files that a part's own pairs lie on.
 
@@ -60,36 +88,41 @@ class Folder:
         InputError
             The folder cannot be written.
         """
-        try:
-            self.path.mkdir(exist_ok=True)
-            (self.path / file_io.MANIFEST).unlink(missing_ok=True)
-            (self.path / file_io.TABLE).unlink(missing_ok=True)
+        kept = {}
+        with self._writing():
             parts = {self.job.file_of(number): number for number in numbers}
-            self._tidy(None if whole else parts)
-            there = file_io.parts_of(self.path)
-            told = self._ledger.read(there)
-            kept = {}
+            if not self._whole:
+                self._tidy(parts)
             for file, number in parts.items():
-                if file not in there:
+                self._stale.discard(file)
+                if file not in self._there:
                     continue
-                outcome = told.get(file) or self._outcome(file, number)
+                outcome = self._told.pop(file, None)
+                told = outcome is not None
+                outcome = outcome or self._outcome(file, number)
                 if outcome is None or outcome.number != number or outcome.sites != hashes(number):
                     (self.path / file).unlink()
-                else:
-                    kept[number] = outcome
-                    if file not in told:
-                        self._ledger.note(file, outcome)
-            for other in there.keys() - parts.keys() if whole else ():
-                (self.path / other).unlink()
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
+                    continue
+                kept[number] = outcome
+                if not told:
+                    self._ledger.note(file, outcome)
         return kept
 
-    def _tidy(self, parts: Container[str] | None) -> None:
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
+
+    def _tidy(self, parts: Container[str] | None, but: Path | None = None) -> None:
         """Remove the halves that a run left which was killed: those of some parts, or all.
 
         Another machine may be writing a part of its own share.
         """
+        for stale in self.path.glob(f".{file_io.TABLE}.*.tmp") if parts is None else ():
+            if stale != but:
+                stale.unlink(missing_ok=True)
         for folder in file_io.part_folders(self.path):
             inner = "" if folder == self.path else f"{folder.name}/"
             for stale in folder.glob(_TEMPORARY):
@@ -122,33 +155,58 @@ class Folder:
             The ledger cannot be written.
         """
         if outcome.rows:
-            try:
+            with self._writing():
                 self._ledger.note(self.job.file_of(outcome.number), outcome)
-            except OSError as error:
-                raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
 
-    def leave(self) -> None:
-        """Leave no folder behind that nothing was drawn into."""
-        self._ledger.close()
-        with contextlib.suppress(OSError):
-            for folder in reversed(file_io.part_folders(self.path)):
-                with contextlib.suppress(OSError):
-                    folder.rmdir()
-
-    def finish(self, table: Record, manifest: dict[str, Any]) -> None:
-        """Write the table of pairs and, last of all, the manifest.
+    def add(self, table: Record) -> None:
+        """Write rows of the table of pairs, which grows beside its name.
 
         Raises
         ------
         InputError
             The folder cannot be written.
         """
-        # There is none where no pair could be drawn: its table says why.
+        with self._writing():
+            if self._table is None:
+                # There is none where no pair could be drawn: its table says why.
+                self.path.mkdir(exist_ok=True)
+                temporary, stream = file_io.temporary_of(self.path / file_io.TABLE)
+                self._table = temporary, stream, record.GrowingRecord(stream)
+            self._table[2].add(table)
+
+    def leave(self) -> None:
+        """End writing; leave no folder behind that nothing was drawn into."""
+        self._ledger.close()
+        if self._table is not None:
+            temporary, stream, _ = self._table
+            stream.close()
+            temporary.unlink(missing_ok=True)
         with contextlib.suppress(OSError):
-            self.path.mkdir(exist_ok=True)
-        # A worker that died in the middle of a part has left its half.
-        self._tidy(None)
-        file_io.write(self.path / file_io.TABLE, record.encode(table))
+            for folder in reversed(file_io.part_folders(self.path)):
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+
+    def finish(self, manifest: dict[str, Any]) -> None:
+        """Give the table of pairs its name and, last of all, write the manifest.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        assert self._table is not None
+        temporary, stream, table = self._table
+        with self._writing():
+            for stale in self._stale:
+                (self.path / stale).unlink()
+            # A worker that died in the middle of a part has left its half.
+            self._tidy(None, temporary)
+            table.close()
+            stream.flush()
+            os.fsync(stream.fileno())
+            stream.close()
+            temporary.replace(self.path / file_io.TABLE)
+        self._table = None
         text = json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
         file_io.write(self.path / file_io.MANIFEST, text.encode())
         with contextlib.suppress(OSError):

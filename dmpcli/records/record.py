@@ -136,7 +136,44 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
     OSError
         It cannot be written.
     """
-    form = form or Form()
+    table, said = _arrow_table(record, form or Form())
+    pq.write_table(table, sink, **said)
+
+
+class GrowingRecord:
+    """A Parquet file that is written some rows at a time; each time they are a row group.
+
+    Parameters
+    ----------
+    sink : file
+        Open Arrow or Python file.
+    form : Form, optional
+    """
+
+    def __init__(self, sink: Any, form: Form | None = None) -> None:
+        self._sink, self._form = sink, form or Form()
+        self._writer: Any = None
+
+    def add(self, record: Record) -> None:
+        """Write more rows, of one schema and provenance.
+
+        Raises
+        ------
+        OSError
+        """
+        table, said = _arrow_table(record, self._form)
+        if self._writer is None:
+            self._writer = pq.ParquetWriter(self._sink, table.schema, **said)
+        self._writer.write_table(table)
+
+    def close(self) -> None:
+        """Write what a file ends with."""
+        if self._writer is not None:
+            self._writer.close()
+
+
+def _arrow_table(record: Record, form: Form) -> tuple[Any, dict[str, Any]]:
+    """Return a record as an Arrow table, and how it is written."""
     fields, arrays = [], []
     for name, column in record.schema.columns.items():
         if name not in record.columns:
@@ -150,16 +187,13 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
             pa.field(name, kind, metadata={"unit": column.unit, "meaning": column.meaning})
         )
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={KEY: header(record)}))
-    floats = [f.name for f in fields if pa.types.is_floating(f.type)]
-    others = [f.name for f in fields if not pa.types.is_floating(f.type)]
-    pq.write_table(
-        table,
-        sink,
-        compression=form.compression,
-        use_byte_stream_split=floats,
-        use_dictionary=others,
-        write_page_checksum=True,
-    )
+    said = {
+        "compression": form.compression,
+        "use_byte_stream_split": [f.name for f in fields if pa.types.is_floating(f.type)],
+        "use_dictionary": [f.name for f in fields if not pa.types.is_floating(f.type)],
+        "write_page_checksum": True,
+    }
+    return table, said
 
 
 def repeated(texts: Sequence[str], counts: int | Sequence[int]) -> Any:
@@ -397,7 +431,7 @@ def foreign_parts(folder: Path) -> list[str]:
     A damaged Parquet file, or an empty one, counts as ours: a power cut can leave such parts.
     """
     foreign = []
-    names = [] if not folder.is_dir() else [*parts_of(folder), TABLE]
+    names = sorted([*parts_of(folder), TABLE]) if folder.is_dir() else []
     for file in (folder / name for name in names):
         if not file.is_file():
             continue

@@ -41,7 +41,7 @@ from dmpcli.workflows.surface_input import SurfaceInput, placed_input
 
 _POSE = "column 'pose'"
 
-_MOST_FACES = 150_000
+_MOST_FACES = 100_000
 """Meshes of so many faces together are held for the next pairs on them."""
 
 

@@ -47,7 +47,8 @@ def put(folder, job, number):
 
 def opened(job, numbers, whole=True):
     folder = Folder(job)
-    kept = folder.open(numbers, whole, lambda _: [])
+    folder.open(whole)
+    kept = folder.kept(numbers, lambda _: [])
     folder.leave()
     return kept
 
