@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import trimesh
 
-from benchmarks.batches import family, used
+from benchmarks.batches import family
 from benchmarks.cluster_demo import BIN
 
 HALF, SIDE, BAD = 100.0, 159, 10
@@ -79,6 +79,15 @@ def memory_of(pid: int) -> int:
     return 1024 * own + sum(memory_of(int(child)) for child in below)
 
 
+def processor_of(pid: int) -> float:
+    """Processor seconds of a process."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
 def measured(words: list[str], stop_at: Path | None = None, parts: int = 0) -> tuple[float, ...]:
     """Run a command; wall s, processor s, largest memory in MiB."""
     begin = time.perf_counter()
@@ -89,7 +98,7 @@ def measured(words: list[str], stop_at: Path | None = None, parts: int = 0) -> t
         nonlocal largest
         while process.poll() is None:
             largest = max(largest, memory_of(process.pid))
-            spent.update({pid: used(pid)[0] for pid in family(process.pid)})
+            spent.update({pid: processor_of(pid) for pid in family(process.pid)})
             time.sleep(0.2)
 
     watcher = threading.Thread(target=watch)

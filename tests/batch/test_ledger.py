@@ -5,13 +5,13 @@ import os
 
 import numpy as np
 
-from dmpcli.batch import run as batch_run
 from dmpcli.batch.dataset_folder import Folder
 from dmpcli.batch.part import Job, Outcome
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.records.record import Form, Provenance, Record
+from dmpcli.workflows import batches
 from tests.batch.test_run import content, run, write_pairs
 from tests.batch.test_run import learned as learned
 
@@ -92,7 +92,7 @@ def test_the_ledger_of_another_batch_is_none_and_half_a_line_is_passed_over(tmp_
 def test_many_parts_lie_in_several_folders_and_are_read_from_there(learned, tmp_path, monkeypatch):
     table = write_pairs(tmp_path / "p.csv", 230, bad=(60,))
     run(learned, tmp_path / "flat", table, "--on-error", "skip")
-    monkeypatch.setattr(batch_run, "MOST_IN_ONE", 3)
+    monkeypatch.setattr(batches, "MOST_IN_ONE", 3)
     monkeypatch.setattr(file_io, "MOST_IN_FOLDER", 2)
     run(learned, tmp_path / "b", table, "--on-error", "skip", "--shard", "2/2")
     told = run(learned, tmp_path / "b", table, "--on-error", "skip")
