@@ -11,6 +11,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -36,7 +37,9 @@ class Folder:
 
     def __init__(self, job: Job, share: str = "1-of-1") -> None:
         self.job, self.path = job, Path(job.folder)
-        self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
+        columns = {schemas.EVENT: np.empty(0, dtype=object)} if job.task.events else {}
+        empty = Record(schemas.TRAJECTORY, columns, job.provenance)
+        self._expected = json.loads(record.header(empty))
         self._own = () if job.prepare is None else tuple(job.provenance.facts)
         self._ledger = Ledger(self.path, self._expected, share)
         self._whole = True

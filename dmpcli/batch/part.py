@@ -24,6 +24,8 @@ from dmpcli.errors import DmpError, InputError, RefusedError
 from dmpcli.records import file_io, record, trajectory
 from dmpcli.records.record import Form, Provenance, Record
 from dmpcli.records.schemas import OK
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.surfaces.surface import LEAVES, Status, Surface
 
 
@@ -203,16 +205,21 @@ class Settled:
         As they are to be written, one for each id.
     status : str
         ``ok``, or why it cannot be drawn.
+    events : list of tuple of OutputEvent
+        What each of the strokes switches; empty where nothing was asked for.
     """
 
     ids: list[str]
     strokes: list[DrawnStroke]
     status: str
+    events: list[tuple[OutputEvent, ...]] = field(default_factory=list)
 
 
 def settle(task: Task, ids: Sequence[str], strokes: Sequence[DrawnStroke]) -> list[Settled]:
     """Return strokes of these ids as they are to be written, or why they cannot be drawn."""
     found = [_settled(task, name, stroke) for name, stroke in zip(ids, strokes, strict=True)]
+    if task.events:
+        found = [_switching(task, one) if one.status == OK else one for one in found]
     if task.reach is None:
         return found
     good = [i for i, one in enumerate(found) if one.status == OK]
@@ -224,6 +231,32 @@ def settle(task: Task, ids: Sequence[str], strokes: Sequence[DrawnStroke]) -> li
             if refusal and found[i].status == OK:
                 found[i] = replace(found[i], status=refusal)
     return found
+
+
+def _switching(task: Task, one: Settled) -> Settled:
+    """Return strokes with the times at which they switch outputs, or why there is none."""
+    try:
+        events = [
+            output_events.placed(task.events, piece.timing.t, piece.position, _height(task, piece))
+            for piece in one.strokes
+        ]
+    except output_events.NotPlacedError as error:
+        return replace(one, status=f"--event {error}")
+    return replace(one, events=events)
+
+
+def _height(task: Task, stroke: DrawnStroke) -> Floats | None:
+    """Height of each sample over the work, mm: over the surface, else over the stroke's start."""
+    if not any(event.place in ("lift", "touch") for event in task.events):
+        return None
+    x = stroke.position
+    offset = 0.0 if task.style.heights is None else task.style.heights.offset
+    if task.surface is not None:
+        found = task.surface.closest(x)
+        # On which side of the surface the tool is, the stroke itself tells.
+        normal = found.normal if stroke.normal is None else stroke.normal
+        return np.asarray(np.sum((x - found.position) * normal, axis=-1) - offset)
+    return None if stroke.normal is None else np.asarray((x - x[0]) @ stroke.normal[0])
 
 
 def _settled(task: Task, name: str, stroke: DrawnStroke) -> Settled:
@@ -264,6 +297,7 @@ def draw_part(job: Job, part: Part) -> Outcome:
     task = job.task
     blocks = list(draw_blocks(task.skill, part.pairs, part.duration, task.surface, task.style))
     plain = len(blocks) == 1 and task.reach is None and task.style.pace is None
+    plain = plain and not task.events
     if plain and (blocks[0].status == Status.DRAWN).all():
         outcome = Outcome(part.number, {}, {}, int(blocks[0].unfolded.sum()))
         drawn = trajectory.block_record(part.ids, blocks[0], job.provenance)
@@ -283,7 +317,8 @@ def _kept(
         return outcome
     ids = [name for one in kept for name in one.ids]
     strokes = [stroke for one in kept for stroke in one.strokes]
-    drawn = trajectory.trajectory_record(ids, strokes, provenance)
+    events = [switched for one in kept for switched in one.events]
+    drawn = trajectory.trajectory_record(ids, strokes, provenance, events)
     return _written(job, part, outcome, drawn)
 
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.options import SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import ARMS, SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.commands.process_options import KeepOut
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
-from dmpcli.settings.options import Given, with_options
+from dmpcli.settings.options import Given, choice, with_options
 
 if TYPE_CHECKING:
     from dmpcli.records.pairs import PairTable
@@ -70,7 +70,9 @@ def command(
     robot_model: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66, ur5e."
+            metavar="NAME",
+            help="Check reach, joint limits and speeds of an arm: ec66, ur5e.",
+            autocompletion=choice(*ARMS),
         ),
     ] = None,
     tool: Annotated[

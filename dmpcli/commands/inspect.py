@@ -6,6 +6,7 @@ import typer
 
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
+from dmpcli.settings.options import choice
 
 _WIDTH = 80
 
@@ -24,6 +25,9 @@ def command(
         typer.Option(
             metavar="NAME",
             help="Print the JSON Schema of skill, plane, cylinder, sphere or tool files instead.",
+            autocompletion=choice(
+                "skill", "plane", "cylinder", "sphere", "tool", "pose", "manifest"
+            ),
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,

@@ -18,7 +18,7 @@ def command(
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Demonstrations, trajectories, batch folders, runs and skills; - is standard "
             "input. The first demonstration is what the others are compared with.",
             show_default=False,

@@ -14,7 +14,8 @@ from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
 from dmpcli.records.schemas import DRAWN_ON, EULER_ANGLES, NORMAL, POSITION
-from dmpcli.spatial import rotations
+from dmpcli.spatial import output_events, rotations
+from dmpcli.spatial.output_events import OutputEvent
 
 LEAST_HEIGHT = 1e-9
 """A stroke that begins and ends nearer to the surface than this is on it, mm."""
@@ -83,7 +84,12 @@ def facts_of_several(stroke: DrawnStroke, rate: float) -> dict[str, Any]:
     return facts
 
 
-def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Provenance) -> Record:
+def trajectory_record(
+    ids: Sequence[str],
+    strokes: Sequence[DrawnStroke],
+    p: Provenance,
+    events: Sequence[Sequence[OutputEvent]] = (),
+) -> Record:
     """Return the record of several strokes, one after the other.
 
     Parameters
@@ -93,6 +99,8 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Pro
     strokes : sequence of DrawnStroke
         At least one; all with orientation or all without, all flat or all on a curved surface.
     p : Provenance
+    events : sequence of sequence of OutputEvent
+        What each stroke switches; none where nothing was asked for.
     """
     columns: dict[str, Any] = {
         "id": repeated(ids, [len(s.timing.t) for s in strokes]),
@@ -107,6 +115,16 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Pro
     if any(s.normal is not None and len(s.normal) > 1 for s in strokes):
         normal = np.concatenate([_normals(s) for s in strokes])
         columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
+    forces = [s.force for s in strokes if s.force is not None]
+    if forces:
+        columns["fn"] = np.concatenate(forces)
+    if events:
+        texts = [
+            text
+            for one, stroke in zip(events, strokes, strict=True)
+            for text in output_events.stored(one, stroke.timing.t)
+        ]
+        columns[schemas.EVENT] = np.array(texts, dtype=object)
     return Record(schemas.TRAJECTORY, columns, p)
 
 
@@ -138,6 +156,8 @@ def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record
         columns |= {name: _column(block.euler[..., i]) for i, name in enumerate(EULER_ANGLES)}
     if block.normal is not None and block.normal.shape[1] > 1:
         columns |= {name: _column(block.normal[..., i]) for i, name in enumerate(NORMAL)}
+    if block.force is not None:
+        columns["fn"] = np.tile(block.force, count)
     return Record(schemas.TRAJECTORY, columns, p)
 
 

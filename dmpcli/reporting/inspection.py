@@ -268,7 +268,8 @@ def _mesh(source: Source) -> Row:
         "version": None,
         "summary": f"A triangle mesh, to draw on with --surface. It does not tell its unit: {guess}"
         "; lengths below are in its own.",
-        "content": content,
+        "told": [f"room: {one}" for one in content["room"]],
+        "content": {key: value for key, value in content.items() if key != "room"},
     }
 
 

@@ -19,6 +19,8 @@ from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import AskedEvent
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
@@ -127,6 +129,11 @@ def prepared(order: Order) -> Ready:
     process.check_skill(settings, skill, table, order.keep_out)
     table = process.copied(table, settings)
     given = None if read is None else facing_tool(read.surface, skill, table, str(read.path))
+    if settings.force_setpoint is not None and settings.offset > 0.0:
+        raise InputError(
+            f"--force-setpoint: nothing presses at --offset {settings.offset:g} mm off the "
+            "surface; leave one of them out"
+        )
     style = style_of(settings.style(), skill, given, settings.contact, settings.offset)
     style = process.process_style(style, settings, order.on_border, given, order.keep_out, inputs)
     said = mark(skill, skill.name)
@@ -143,11 +150,24 @@ def prepared(order: Order) -> Ready:
     _judge(order, table, given, style)
     taught = learning_record.of_skill(skill.file).facts()
     return Ready(
-        Task(skill.plain(), given, style, reach),
+        Task(skill.plain(), given, style, reach, asked_events(settings)),
         table,
         durations(skill, table.duration, settings),
         Provenance("generalize", options, tuple(inputs), taught),
     )
+
+
+def asked_events(settings: GeneralizeSettings) -> tuple[AskedEvent, ...]:
+    """Return what is switched along each stroke, and tell what stays on."""
+    events = output_events.asked(settings.event or ())
+    for name in dict.fromkeys(event.output for event in events):
+        own = [event for event in events if event.output == name]
+        if all(event.on for event in own):
+            warn(
+                f"{name} is switched on and never off: execute switches it off when a run ends, a "
+                f"robot program leaves it on; --event off@end:{name} has it off with the stroke"
+            )
+    return events
 
 
 def check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> None:

@@ -30,11 +30,19 @@ from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import OK
 from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.spatial.output_events import asked
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
 from dmpcli.workflows import process
-from dmpcli.workflows.generalize import Order, Ready, check_asked, durations, objections
+from dmpcli.workflows.generalize import (
+    Order,
+    Ready,
+    asked_events,
+    check_asked,
+    durations,
+    objections,
+)
 from dmpcli.workflows.generalize_inputs import facing_tool, in_base, reach_of, style_of
 from dmpcli.workflows.generalize_messages import mark, tell_of_stretch, tell_of_surface
 from dmpcli.workflows.surface_input import SurfaceInput, placed_input
@@ -116,7 +124,7 @@ def prepared_sites(
         SurfaceReader(MeshStore(_text(cache))),
     )
     return Ready(
-        Task(skill.plain(), None, settings.style(), reach),
+        Task(skill.plain(), None, settings.style(), reach, asked_events(settings)),
         table,
         durations(skill, table.duration, settings),
         Provenance(
@@ -286,6 +294,11 @@ class SiteWork:
             The surface cannot be read or placed, or none of its pairs can be drawn.
         """
         skill, settings, name = self.skill, self.settings, site.surface.name
+        if settings.force_setpoint is not None and site.offset > 0.0:
+            raise InputError(
+                f"--force-setpoint: nothing presses at an offset of {site.offset:g} mm off the "
+                "surface; leave one of them out"
+            )
         read, remarks = self.reader.read(site)
         table = PairTable(name, ids, pairs, None, duration, [OK] * len(ids))
         with heard() as told:
@@ -303,7 +316,7 @@ class SiteWork:
         good = np.flatnonzero(verdict.admitted)
         start, goal = on.start.copy(), on.goal.copy()
         start[good], goal[good] = ends(skill, on[good], given, style.turn)
-        task = Task(skill.plain(), given, style, self.reach)
+        task = Task(skill.plain(), given, style, self.reach, asked(settings.event or ()))
         return (
             Prepared(
                 task,

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from dmpcli.errors import InputError, counted
 from dmpcli.messages import tell, warn
+from dmpcli.spatial import output_events
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,7 @@ def check(
     InputError
         Names the options.
     """
+    output_events.asked(settings.event or ())
     if settings.inclination is not None and given.get("orientation") == "keep":
         raise InputError(
             "--lead and --tilt lean the tool off the surface's normal, with which --orientation "
