@@ -99,7 +99,7 @@ def _query(url: str, role: str, query: str) -> dict[str, str]:
 
 
 def in_provenance(url: str | None) -> str | None:
-    """Return what a file may say of an instrument: all of a simulated URL, of a real one its scheme.
+    """Return what a file may say of an instrument: a simulated URL, a real one's scheme.
 
     Parameters
     ----------
