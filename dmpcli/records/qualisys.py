@@ -41,10 +41,8 @@ def read(source: Source) -> Table:
     names = _names(every[at - 1].split("\t"), said, width, source.name)
     untrusted.judge_columns(source.name, len(names), names)
     kept = [i for i in range(at, len(every)) if every[i]]
-    body = "\n".join(every[i] for i in kept).encode()
-    lines = np.array(kept, dtype=np.int64) + 1
-    found = TextLines(body, 0, len(body), lines)
-    columns = tables.body_columns(found, names, b"\t", source.name)
+    body = TextLines.kept(every, kept)
+    columns = tables.body_columns(body, names, b"\t", source.name)
     remarks = []
     if "Time" not in names:
         rate = float(said.get("FREQUENCY", ["0"])[0] or 0.0)
@@ -52,7 +50,7 @@ def read(source: Source) -> Table:
             raise InputError(f"{source.name}: has neither times nor a FREQUENCY; export it anew")
         columns["Time"] = np.arange(len(kept)) / rate
         remarks.append(f"time counted by the rows at {rate:g} Hz")
-    return Table(source.name, columns, lines, remarks=tuple(remarks))
+    return Table(source.name, columns, body.numbers, remarks=tuple(remarks))
 
 
 def _is_row(line: str) -> bool:

@@ -60,6 +60,8 @@ class Table:
         The decimal sign of its text.
     remarks : tuple of str
         What a person should know of how it was read.
+    before : int
+        Rows of the file before these, where it is read in pieces.
     """
 
     name: str
@@ -67,13 +69,14 @@ class Table:
     lines: Integers | None = None
     decimal: str = "."
     remarks: tuple[str, ...] = ()
+    before: int = 0
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def at(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     def numbers(self, column: str) -> Floats:
         """Return a column as finite numbers, shape (rows,).
@@ -211,11 +214,15 @@ def read(
 
 
 def _parquet(source: Source) -> Table:
-    table = parquet.table(source)
+    return of_arrow(source.name, parquet.table(source))
+
+
+def of_arrow(name: str, table: Any, before: int = 0) -> Table:
+    """Return an Arrow table, perhaps a piece of a file, as a `Table`."""
     columns: dict[str, Any] = {}
-    for name in table.column_names:
-        columns |= list_columns.expanded(name, table.column(name).combine_chunks())
-    return Table(source.name, columns)
+    for column in table.column_names:
+        columns |= list_columns.expanded(column, table.column(column).combine_chunks())
+    return Table(name, columns, before=before)
 
 
 def _csv(

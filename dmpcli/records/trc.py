@@ -4,8 +4,6 @@ Two lines of words and values, a line of markers, a line of axes, the rows. Form
 documentation, Marker (.trc) Files.
 """
 
-import numpy as np
-
 from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
@@ -46,8 +44,7 @@ def read(source: Source) -> Table:
     if twice is not None:
         raise InputError(f"{source.name}: marker {twice!r} is there twice; rename one")
     kept = [i for i in range(at + 2, len(every)) if every[i].strip()]
-    body = "\n".join("\t".join(every[i].split("\t")[: len(names)]) for i in kept).encode()
-    lines = np.array(kept, dtype=np.int64) + 1
-    found = TextLines(body, 0, len(body), lines)
-    columns = tables.body_columns(found, names, b"\t", source.name)
-    return Table(source.name, columns, lines)
+    every = ["\t".join(line.split("\t")[: len(names)]) for line in every]
+    body = TextLines.kept(every, kept)
+    columns = tables.body_columns(body, names, b"\t", source.name)
+    return Table(source.name, columns, body.numbers)

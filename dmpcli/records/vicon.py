@@ -9,8 +9,6 @@ unasked.
 import csv
 import io
 
-import numpy as np
-
 from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
@@ -59,14 +57,12 @@ def read(source: Source) -> Table:
     names, remarks = _names(subjects, axes, units)
     untrusted.judge_columns(source.name, len(names), names)
     kept = _until_blank(every, at + 2)
-    body = "\n".join(every[i] for i in kept).encode()
-    lines = np.array(kept, dtype=np.int64) + 1
-    found = TextLines(body, 0, len(body), lines)
-    columns = tables.body_columns(found, names, separator.encode(), source.name)
-    frames = Table(source.name, columns, lines).numbers(names[0])
+    body = TextLines.kept(every, kept)
+    columns = tables.body_columns(body, names, separator.encode(), source.name)
+    frames = Table(source.name, columns, body.numbers).numbers(names[0])
     columns["Time"] = frames / rate
     remarks.append(f"time counted by the frames at {rate:g} Hz")
-    return Table(source.name, columns, lines, remarks=tuple(remarks))
+    return Table(source.name, columns, body.numbers, remarks=tuple(remarks))
 
 
 def _until_blank(every: list[str], first: int) -> list[int]:
