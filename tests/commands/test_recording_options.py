@@ -105,7 +105,11 @@ def test_inspect_names_the_option_that_reads_a_table(tmp_path):
         ("no_header.csv", table("", T, *XYZ.T), "--columns t,x,y,z"),
         ("no_time.csv", table("x,y,z", *XYZ.T), "--sample-rate HZ"),
         ("units.csv", table("t [s],x [m],y [m],z [m]", T, *METRES.T), "-o skill.json"),
-        ("comma.csv", PLAIN.replace(",", ";").replace(".", ","), "commas between digits read as decimal signs"),
+        (
+            "comma.csv",
+            PLAIN.replace(",", ";").replace(".", ","),
+            "commas between digits read as decimal signs",
+        ),
     ):
         (tmp_path / name).write_text(text)
         done = run("inspect", tmp_path / name)
