@@ -110,9 +110,9 @@ def test_each_of_several_strokes_is_planned_from_where_the_one_before_it_ended()
 def test_the_set_points_wait_for_the_look_ahead():
     between = execution_plan.ways(ExecuteSettings(), 0.15, presses=False)
     assert (between.settling, between.clearance, between.spare) == (8, 20.0, 0.0)
-    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 5.0
+    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 15.0
     with pytest.raises(InputError, match="--clearance 5: must be over 5 mm"):
-        execution_plan.ways(ExecuteSettings(clearance=5.0), 0.0, presses=True)
+        execution_plan.ways(ExecuteSettings(clearance=5.0, coupling_clamp=5.0), 0.0, presses=True)
 
 
 def test_the_facts_hold_each_strokes_own_ends_once():
