@@ -99,7 +99,9 @@ def read(kept: list[Path]) -> Reach:
 
 def _here(module: ModuleType) -> bool:
     """Tell what lies in this repository: it, or what it loads, is what mutants are put into."""
-    return str(getattr(module, "__file__", None) or "").startswith(f"{Path.cwd()}/")
+    file = str(getattr(module, "__file__", None) or "")
+    # The environment may stand in the repository's folder.
+    return file.startswith(f"{Path.cwd()}/") and not file.startswith(f"{sys.prefix}/")
 
 
 def load(modules: list[str]) -> None:
