@@ -18,6 +18,7 @@ import logging
 import multiprocessing
 import tempfile
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,7 @@ class Case:
     settings: dict[str, Any] = field(default_factory=dict)
 
 
+@lru_cache
 def planned(plan: str, offset: float) -> dmpcli.Trajectory:
     """Return the stroke on the surface that the plan knows, so far off it, mm."""
     skill = dmpcli.fit(dmpcli.read(ROOT / "sample_runs" / "reference.parquet"))
