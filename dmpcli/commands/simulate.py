@@ -34,12 +34,14 @@ def command(
     served: SimulateOptions,
     surface: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help=f"What the tool touches: {SURFACES}; else a flat plate."),
+        typer.Option(
+            metavar="FILE", help=f"What the tool touches: {SURFACES}.  [default: a flat plate]"
+        ),
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
     tool: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The tool as it truly is; else a pen.")
+        Path | None, typer.Option(metavar="FILE", help="The tool as it truly is.  [default: a pen]")
     ] = None,
     drawn: Annotated[
         str | None,

@@ -20,6 +20,7 @@ from dmpcli.arrays import AnyArray, Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import Motion, MotionStroke
 from dmpcli.records import untrusted
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 
@@ -236,6 +237,11 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     InputError
         Damaged, of another state, or with several episodes and none chosen.
     """
+    with untrusted.decoding(str(folder)):
+        return _read(folder, episode)
+
+
+def _read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     names, episodes = _described(folder)
     number = _number(folder, episode, episodes)
     files = sorted((folder / "data").rglob("*.parquet"))
@@ -249,8 +255,14 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
         raise InputError(f"{folder}: holds no samples of episode {number}")
     known = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     state, t = known[_STATE], known["timestamp"]
-    if len(t) < 2 or not np.isfinite(state).all() or not np.isfinite(t).all():
-        raise InputError(f"{folder}: episode {number} holds a value that is not finite, or nothing")
+    _check_width(folder, _STATE, state, len(names))
+    if _WRENCH in known:
+        _check_width(folder, _WRENCH, known[_WRENCH], len(_FELT))
+    if len(t) < 2 or not all((np.abs(each) <= LARGEST).all() for each in known.values()):
+        raise InputError(
+            f"{folder}: episode {number} holds a value that is not a number or beyond "
+            f"{LARGEST:g}, or nothing"
+        )
     if (np.diff(t) <= 0.0).any():
         raise InputError(f"{folder}: episode {number}: its time does not increase")
     place = [names.index(name) for name in _PLACE]
@@ -267,13 +279,29 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     return MotionStroke(t, position, R, id=str(number), wrench=felt, joints=joints), told
 
 
+def _check_width(folder: Path, name: str, values: Floats, width: int) -> None:
+    if values.shape[1] != width:
+        raise InputError(
+            f"{folder}: {name} holds {values.shape[1]} numbers a sample, {width} are described; "
+            "the dataset is damaged"
+        )
+
+
 def _described(folder: Path) -> tuple[list[str], int]:
     """Return the names of the state's numbers, and how many episodes there are."""
     try:
         info = json.loads((folder / INFO).read_text(encoding="utf-8"))
         version, state = str(info["codebase_version"]), info["features"][_STATE]
         names, episodes = state.get("names"), int(info["total_episodes"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (
+        OSError,
+        ArithmeticError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):
         raise InputError(f"{folder}: {INFO} is missing or damaged; no LeRobot dataset") from None
     if isinstance(names, dict) and len(names) == 1:
         [names] = names.values()

@@ -15,6 +15,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import MotionStroke
 from dmpcli.messages import warn
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import log
@@ -99,12 +100,14 @@ class ProgramMoves:
         Raises
         ------
         InputError
-            A number is not finite, a speed not above 0, or a time below 0.
+            A number is beyond what any quantity is, a speed not above 0, or a time below 0.
         """
-        if not all(map(math.isfinite, target)):
-            raise self.wrong(line, "a coordinate is not a finite number")
-        if speed <= 0.0 or turn <= 0.0 or seconds < 0.0 or math.inf in (speed, turn, seconds):
+        if not all(abs(value) <= LARGEST for value in target):
+            raise self.wrong(line, f"a coordinate is not a number, or beyond {LARGEST:g}")
+        if speed <= 0.0 or turn <= 0.0 or seconds < 0.0:
             raise self.wrong(line, "a speed must be above 0, a time at least 0")
+        if not _reasonable(speed) or not _reasonable(turn) or seconds > LARGEST:
+            raise self.wrong(line, f"a speed or time is beyond {LARGEST:g}, or as small")
         self.targets.append(target)
         self.lines.append(line)
         self.speed.append(speed)
@@ -202,6 +205,11 @@ class ProgramMoves:
                 spans.append((begun[0], at - 1, begun[1]))
             begun = None if name is None else (max(at - 1, 0), name)
         return spans
+
+
+def _reasonable(rate: float) -> bool:
+    """Tell a rate that can be divided by, or one that is not said: NaN."""
+    return not abs(math.log10(rate)) > math.log10(LARGEST)
 
 
 _MARK = re.compile(r"(stroke|end of stroke) (.{0,200})")

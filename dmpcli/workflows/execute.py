@@ -15,6 +15,7 @@ from dmpcli.control import (
     preflight_table,
     stopping,
     stroke_file,
+    watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -40,6 +41,7 @@ from dmpcli.workflows.run_output import (
     interruptible,
     refuse_replacing,
 )
+from dmpcli.workflows.told_later import ContactTeller
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,11 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    if not presses and "force_setpoint" in said:
-        raise InputError("--force-setpoint: nothing presses without --coupling force")
+    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+        if option in said and not presses:
+            raise InputError(
+                f"--{option.replace('_', '-')}: nothing presses without --coupling force"
+            )
     for option in ("max_force", "max_torque"):
         if option in said and not (feels or presses):
             raise InputError(
@@ -185,6 +190,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
+    teller = ContactTeller(realtime and request.presses and keeper is not None)
     try:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
@@ -194,17 +200,19 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(preflight_table.table(judged))
+            tell(preflight_table.table(judged), preflight_table.facts(judged))
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
-        loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
+        loop = _loop(
+            bench, arm, judged, settings, request, coupling, tool_file, keeper, batch, teller
+        )
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
-        provenance.facts.update(execution.facts_of(arm, coupling, settings))
+        provenance.facts.update(execution.facts_of(arm, coupling))
         outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
-        closing = guards.leave(robot.close, bench.sensor.close, lock.release)
+        closing = guards.leave(robot.close, bench.sensor.close, lock.release, teller.close)
     with stopping.outranking(lambda: outcome.stop):
         if realtime:
             tell(str(loop.timing))
@@ -293,6 +301,8 @@ def _loop(
     coupling: Filter | None,
     tool_file: Source | None,
     keeper: RunOutput,
+    batch: StrokeSelection,
+    teller: ContactTeller,
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
@@ -300,7 +310,12 @@ def _loop(
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
-        touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+        policy = None
+        if coupling is not None:
+            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+        touch = execution.touch(
+            bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller
+        )
     watch = execution.watch(settings)
     kind: type[PlanLoop] = ServoLoop
     if isinstance(arm.servo, PlanPlayer):
@@ -368,7 +383,9 @@ def _stream(
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
-            outcome = loop.run(interruption)
+            with watching.live(lambda: watching.of_plan(loop), realtime) as ended:
+                outcome = loop.run(interruption)
+                ended(outcome.reason)
         finally:
             if len(loop.log):
                 made = execution.record_of(loop, outcome, provenance, realtime, reach)

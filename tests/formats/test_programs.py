@@ -253,6 +253,24 @@ def test_a_program_that_does_more_is_refused_with_its_line(language, line, words
         read(language, text.replace("\n", f"\n{line}\n", 1))
 
 
+HUGE = {
+    "urscript": "movel(p[{0}, 0, 0, 0, 0, 0], a=1, v={1})",
+    "krl": "$VEL.CP={1}\nLIN {{X {0},Y 0,Z 0,A 0,B 0,C 0}}",
+    "rapid": "MoveL [[{0},0,0],[1,0,0,0],[0,0,0,0],[0,0,0,0,0,0]], v1000\\V:={1}, fine, tool0;",
+}
+
+
+@pytest.mark.parametrize(("place", "speed"), [("1e300", "1"), ("5", "1e-320"), ("5", "1e300")])
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_numbers_that_are_no_quantities_are_refused_before_anything_overflows(
+    language, place, speed
+):
+    lines = [HUGE[language].format(0, 1), HUGE[language].format(place, speed)]
+    text = "\n".join(lines)
+    with pytest.raises(InputError, match=rf"line {text.count(chr(10)) + 1}: .* 1e\+30"):
+        read(language, text)
+
+
 @given(st.integers(3, 60), st.floats(0.001, 1.0), st.integers(0, 2**32 - 1))
 def test_thinning_leaves_nothing_further_off_than_its_tolerance(samples, tolerance, seed):
     rng = np.random.default_rng(seed)
