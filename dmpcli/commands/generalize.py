@@ -116,9 +116,11 @@ def command(
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     sites = table is not None and table.places is not None
+    batch_options.check_surfaces(wanted, given, sites, named is not None)
     read = None
     if surface is not None and not sites:
-        read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
+        store = surface_input.store_in(wanted.surface_cache)
+        read = surface_input.read(surface, surface_pose, surface_unit, True, store)
     inputs: list[dict[str, str]] = []
     if table is None:
         assert start is not None
