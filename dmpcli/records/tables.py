@@ -233,7 +233,7 @@ def _csv(
     separator = _separator(header, body.rest().text(_LONGEST_LINE))
     names = _cells(header, separator)
     untrusted.judge_columns(source.name, len(names), names)
-    headless = bool(names) and all(map(_is_number, names))
+    headless = _are_values(names)
     if headless and not given:
         raise HeadlessError(source.name, int(numbers[0]), len(names))
     remarks = []
@@ -402,6 +402,12 @@ def _separator(header: bytes, body: bytes) -> bytes:
 
 def _is_number(cell: str) -> bool:
     return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
+
+
+def _are_values(cells: Sequence[str]) -> bool:
+    """Tell a row from names: numbers, among them a word or two such as a frame's name."""
+    numbers = sum(map(_is_number, cells))
+    return bool(cells) and (numbers == len(cells) or (numbers > 3 and len(cells) - numbers <= 2))
 
 
 def named(given: Sequence[str], count: int, source: str) -> list[str]:
