@@ -17,7 +17,8 @@
 #   make judges      the tests that programs of others judge, which make test does without
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
-#   make mutations   damaged and crafted inputs for every reader: what is not refused
+#   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
+#   make mutants     small faults in the mathematics and the loops: which no test would notice
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -44,7 +45,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .PHONY: help setup docs reference demo reproduce test test-quick coverage test-lowest lint lock dist bench peers judges faults \
-    soak mutations cluster-demo samples pictures schemas clean FORCE
+    soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -131,6 +132,7 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.noise
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python -m benchmarks.csv_reading
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
 	$(BIN)/python -m benchmarks.taught_surfaces
@@ -158,8 +160,18 @@ faults: $(VENV)/installed
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
 
+# Of each reader; one number replays one: python -m benchmarks.mutations --again READER NUMBER.
+MUTATIONS ?= 2000
+
 mutations: $(VENV)/installed
-	$(BIN)/python -m benchmarks.mutations --keep $(OUT)/mutations
+	$(BIN)/python -m benchmarks.mutations --count $(MUTATIONS) --keep $(OUT)/mutations
+
+# docs/mutants.md; SEED=N draws the same ones again, and goes on where a run was stopped.
+MUTANTS ?= 500
+JOBS    ?= 1
+
+mutants: $(VENV)/installed
+	nice -n 19 $(BIN)/python -m tools.mutants --count $(MUTANTS) --jobs $(JOBS) $(if $(SEED),--seed $(SEED))
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 

@@ -71,7 +71,12 @@ UR = Extra(
 DASK = Extra("dask", ("dask", "distributed", "threadpoolctl"), "`generalize --cluster`")
 SVG = Extra("svg", ("svgelements",), "`import` of SVG drawings")
 ROS = Extra("ros", ("rosbags", "mcap"), "MCAP files and ROS 2 bags")
-EXTRAS = (UR, DASK, SVG, ROS)
+BENCH = Extra(
+    "bench",
+    ("mujoco",),
+    "`bench://` and `simulate --physics mujoco`, contact with physics",
+)
+EXTRAS = (UR, DASK, SVG, ROS, BENCH)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",

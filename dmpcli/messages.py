@@ -222,6 +222,37 @@ def warn(message: str) -> None:
     LOG.warning("%s", message)
 
 
+class _Heard(logging.Filter):
+    """Keeps what is told instead of letting it through."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.told: list[tuple[int, str]] = []
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Keep a message."""
+        self.told.append((record.levelno, record.getMessage()))
+        return False
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[list[tuple[int, str]]]:
+    """Keep what is told meanwhile, with its level, for somebody else to tell."""
+    kept, level = _Heard(), LOG.level
+    LOG.addFilter(kept)
+    LOG.setLevel(logging.INFO)
+    try:
+        yield kept.told
+    finally:
+        LOG.removeFilter(kept)
+        LOG.setLevel(level)
+
+
+def tell_as(level: int, message: str) -> None:
+    """Say what was heard elsewhere, see `heard`."""
+    LOG.log(level, "%s", message)
+
+
 @contextlib.contextmanager
 def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     """Show a progress bar on the command line's terminal; elsewhere, or when quiet, nothing.

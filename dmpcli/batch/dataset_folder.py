@@ -6,10 +6,11 @@ with the same inputs and options goes on from them: each part's metadata say wha
 
 import contextlib
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -32,9 +33,14 @@ class Folder:
 
     def __init__(self, job: Job) -> None:
         self.path = Path(job.folder)
-        self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
+        columns = {schemas.EVENT: np.empty(0, dtype=object)} if job.task.events else {}
+        empty = Record(schemas.TRAJECTORY, columns, job.provenance)
+        self._expected = json.loads(record.header(empty))
+        self._own = () if job.prepare is None else tuple(job.provenance.facts)
 
-    def open(self, numbers: Iterable[int], whole: bool) -> dict[int, Outcome]:
+    def open(
+        self, numbers: Iterable[int], whole: bool, hashes: Callable[[int], list[list[str | None]]]
+    ) -> dict[int, Outcome]:
         """Make room for these parts, and return the outcomes of those that are already there.
 
         What a finished batch ends with goes first, so that nobody takes the folder for one.
@@ -45,6 +51,8 @@ class Folder:
             Of the parts.
         whole : bool
             Whether these are all parts of the batch: then other parts are stale, and go.
+        hashes : callable
+            Returns the hashes of the files that a part's own pairs lie on.
 
         Raises
         ------
@@ -63,6 +71,8 @@ class Folder:
             kept = {}
             for file, number in parts.items():
                 outcome = self._outcome(file, number)
+                if outcome is not None and outcome.sites != hashes(number):
+                    outcome = None
                 if outcome is None:
                     (self.path / file).unlink(missing_ok=True)
                 else:
@@ -84,6 +94,9 @@ class Folder:
             fact = found["facts"].pop(FACT)
         except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
+        if self._own:
+            # What is so for these surfaces alone.
+            found["facts"] = {k: v for k, v in found["facts"].items() if k in self._own}
         if found != self._expected or fact.get("number") != number:
             return None
         return Outcome(
@@ -95,6 +108,8 @@ class Folder:
             file.stat().st_size,
             pieces={int(row): ends for row, ends in fact.get("pieces", {}).items()},
             slow=fact.get("slow", 0),
+            placed={int(row): place for row, place in fact.get("placed", {}).items()},
+            sites=fact.get("sites", []),
         )
 
     def leave(self) -> None:

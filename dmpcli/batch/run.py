@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.batch.cut import Cut, by_site, in_order
 from dmpcli.batch.dataset_folder import Folder
 from dmpcli.batch.part import Job, Outcome, Part, file_of
+from dmpcli.batch.site import PairSites, SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.time_scaling import timing
-from dmpcli.errors import RefusedError
+from dmpcli.errors import InputError, RefusedError
 from dmpcli.records import manifest, trajectory
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Record
@@ -59,6 +61,8 @@ class Summary:
     slow : int
         Strokes that do not hold the speed that was asked for.
     parts : int
+    told : SitesTold
+        On surfaces that the table names.
     """
 
     drawn: int = 0
@@ -68,6 +72,7 @@ class Summary:
     split: int = 0
     slow: int = 0
     parts: int = 0
+    told: SitesTold = field(default_factory=SitesTold)
 
 
 @dataclass
@@ -86,6 +91,10 @@ class Batch:
     size : int
         Pairs per part.
     shard : Shard
+    sites : PairSites, optional
+        Of the pairs, where the table names them.
+    most_sites : int
+        Sites in a part.
     """
 
     job: Job
@@ -94,23 +103,40 @@ class Batch:
     duration: Floats
     size: int
     shard: Shard = field(default_factory=Shard)
+    sites: PairSites | None = None
+    most_sites: int = 16
 
     def __post_init__(self) -> None:
         self._admitted = self.table.good
         self._outcomes: dict[int, Outcome] = {}
 
+    @cached_property
+    def cut(self) -> Cut:
+        """Which rows each part has."""
+        if self.sites is None:
+            return in_order(len(self.table), self.size)
+        lift = np.array([site.offset for site in self.sites.sites] + [0.0])
+        return by_site(self.sites.of, lift[self.sites.of], self.size, self.most_sites)
+
     def _part(self, number: int) -> Part:
-        """Part n: rows n·size to (n+1)·size - 1."""
-        first = number * self.size
-        rows = first + np.flatnonzero(self._admitted[first : first + self.size])
+        rows = self.cut.rows(number)
+        rows = rows[self._admitted[rows]]
         ids = [self.table.ids[row] for row in rows.tolist()]
-        return Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+        part = Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+        if self.sites is None:
+            return part
+        used, site = np.unique(self.sites.of[rows], return_inverse=True)
+        return replace(part, sites=tuple(self.sites.sites[i] for i in used), site=site)
 
     @cached_property
     def sizes(self) -> dict[int, int]:
         """How many pairs each part of this shard is to draw; parts with none are left out."""
-        counts = np.bincount(np.flatnonzero(self._admitted) // self.size).tolist()
+        counts = np.bincount(self.cut.part[self._admitted]).tolist()
         return {n: size for n, size in enumerate(counts) if size and self.shard.has(n)}
+
+    def _hashes(self, number: int) -> list[list[str | None]]:
+        """Hashes of the files that a part is drawn on, as they are now."""
+        return [site.hashes() for site in self._part(number).sites]
 
     @property
     def count(self) -> int:
@@ -139,7 +165,7 @@ class Batch:
             The folder cannot be written.
         """
         folder = Folder(self.job)
-        kept = folder.open(self.sizes, self.shard.whole)
+        kept = folder.open(self.sizes, self.shard.whole, self._hashes)
         summary = Summary(kept=len(kept))
         try:
             for outcome in self._all(kept, draw):
@@ -159,11 +185,13 @@ class Batch:
         self._outcomes[outcome.number] = outcome
         for row, why in outcome.failed.items():
             self.table.status[row] = f"{self.table.place(row)}, pair {self.table.ids[row]}: {why}"
+        for remark in outcome.told:
+            summary.told.add(remark)
         if outcome.fatal:
-            first = self.table.status[min(outcome.failed)]
-            raise RefusedError(
-                f"{self.table.name}: {first}; move the pair, or give --on-error skip"
-            )
+            said = f"{self.table.name}: {self.table.status[min(outcome.failed)]}"
+            if not outcome.refused:
+                raise InputError(f"{said}; or give --on-error skip")
+            raise RefusedError(f"{said}; move the pair, or give --on-error skip")
         summary.parts += 1
         summary.drawn += size - len(outcome.failed)
         summary.failed += len(outcome.failed)
@@ -174,8 +202,8 @@ class Batch:
     def _table(self) -> Record:
         """Return the table of pairs with what became of each; one row for each piece of a split."""
         good = self.table.good
-        names = [file_of(number) for number in range(len(self.table) // self.size + 1)]
-        numbers = np.arange(len(self.table)) // self.size
+        names = [file_of(number) for number in range(self.cut.count)]
+        numbers = self.cut.part
         files = [names[n] if drawn else "" for n, drawn in zip(numbers.tolist(), good, strict=True)]
         ids, pairs, lasting = self.table.ids, self._ends(good), self._lasting(good)
         normals, status = self._normals(good), self.table.status
@@ -195,10 +223,34 @@ class Batch:
             files = [files[row] for row in rows.tolist()]
             status = [status[row] for row in rows.tolist()]
         p = self.job.provenance
-        return trajectory.pairs_record(ids, pairs, lasting, normals, files, status, p)
+        on = None
+        if self.sites is not None:
+            on = self._surfaces(rows if pieces else np.arange(len(self.table)))
+        return trajectory.pairs_record(ids, pairs, lasting, normals, files, status, p, on)
+
+    def _surfaces(self, rows: Integers) -> tuple[list[str], list[str]]:
+        """Names and hashes of the surfaces of some rows; empty where there is none."""
+        assert self.sites is not None
+        names = [site.surface.name for site in self.sites.sites] + [""]
+        hashes = [site.hashes()[0] or "" for site in self.sites.sites] + [""]
+        of = self.sites.of[rows].tolist()
+        return [names[i] for i in of], [hashes[i] for i in of]
+
+    def _placed(self) -> tuple[Integers, Floats]:
+        """Rows (k,) whose table names their surfaces, and start, goal and normal of each (k, 9)."""
+        rows, places = [], []
+        for outcome in self._outcomes.values():
+            rows += list(outcome.placed)
+            places += [(place + [np.nan] * 3)[:9] for place in outcome.placed.values()]
+        return np.array(rows, dtype=np.int64), np.array(places).reshape(-1, 9)
 
     def _ends(self, good: Booleans) -> Pairs:
         """Pairs with the ends that their strokes have themselves."""
+        if self.sites is not None:
+            rows, places = self._placed()
+            start, goal = self.pairs.start.copy(), self.pairs.goal.copy()
+            start[rows], goal[rows] = places[:, :3], places[:, 3:6]
+            return replace(self.pairs, start=start, goal=goal)
         if self.pairs.shift is None:
             return self.pairs
         task, rows = self.job.task, np.flatnonzero(good)
@@ -229,7 +281,10 @@ class Batch:
         """Unit normal of each pair's plane; NaN on a mesh, and where there is no stroke."""
         task, frame = self.job.task, self.job.task.skill.frame
         normal = np.full((len(self.table), 3), np.nan)
-        if isinstance(task.surface, Plane):
+        if self.sites is not None:
+            rows, places = self._placed()
+            normal[rows] = np.where(good[rows, None], places[:, 6:], np.nan)
+        elif isinstance(task.surface, Plane):
             normal[good] = task.surface.normal
         elif task.surface is None and task.skill.model == "original":
             normal[good] = frame.normal

@@ -73,6 +73,12 @@ def command(
             help="Let the controller play the plan, though the arm draws on if the link is lost.",
         ),
     ] = False,
+    ignore_events: Annotated[
+        bool,
+        typer.Option(
+            "--ignore-events", help="Switch no outputs, though the trajectory asks for it."
+        ),
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -97,6 +103,7 @@ def command(
         force,
         dry_run,
         allow_file_mode,
+        ignore_events,
     )
     run = execute(settings, request).run
     if run is not None and run.signal is not None:

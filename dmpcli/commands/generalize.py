@@ -48,7 +48,8 @@ def command(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration].",
+            help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration] and, of each "
+            "pair's own surface, [surface surface_unit pose in offset].",
         ),
     ] = None,
     surface: Annotated[
@@ -86,53 +87,69 @@ def command(
     from dmpcli.workflows.generalize_inputs import one_pair
 
     batch_options.check(wanted, given, pairs is not None)
-    _check_together(pairs, (start_orientation, goal_orientation), surface, given)
-    process.check(settings, given, surface, keep_out)
-    surface_input.check_options(surface, surface_pose, surface_unit)
-    _check_frame(place.in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import process_pool
 
         process_pool.begin()
+    source = table = None
+    if pairs is not None:
+        source = file_io.read(pairs)
+        table = pair_file.read(source)
+    # A table may name surfaces itself, or some of them.
+    named = surface or (pairs if table is not None and table.places is not None else None)
+    _check_together(pairs, (start_orientation, goal_orientation), named, given)
+    process.check(settings, given, named, keep_out)
+    surface_input.check_options(named, surface_pose, surface_unit)
+    _check_frame(place.in_, named, reproduce)
     learned = learned_skill.read(file_io.read(skill))
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
+    sites = table is not None and table.places is not None
     read = None
-    if surface is not None:
+    if surface is not None and not sites:
         read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
     inputs: list[dict[str, str]] = []
-    if pairs is None:
+    if table is None:
         assert start is not None
         assert goal is not None
         table = one_pair(start, goal, start_orientation, goal_orientation)
         options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
-        source = file_io.read(pairs)
-        table, options = pair_file.read(source), wanted.as_options()
+        assert source is not None
+        options = wanted.as_options(sites)
         inputs.append({"role": "pairs", "sha256": source.sha256})
-    ready = prepared(
-        Order(
-            learned,
-            table,
-            settings,
-            read,
-            place.in_,
-            place.on_border,
-            keep_out,
-            robot_model,
-            tool,
-            wanted.stop,
-            options,
-            inputs,
-        )
+    order = Order(
+        learned,
+        table,
+        settings,
+        read,
+        place.in_,
+        place.on_border,
+        keep_out,
+        robot_model,
+        tool,
+        wanted.stop,
+        options,
+        inputs,
     )
     if pairs is None:
-        drawn = single.draw_one(ready)
+        drawn = single.draw_one(prepared(order))
         file_io.write(output, encode(drawn.record))
         tell(f"{file_io.shown(output, output=True)}: {drawn.said}")
+        return
+    batches.tell_of_unknown(table)
+    if sites:
+        from dmpcli.workflows.generalize_sites import Otherwise, prepared_sites
+
+        otherwise = Otherwise(
+            None if surface is None else str(surface), surface_pose, surface_unit, place.in_
+        )
+        folder = Path() if str(pairs) == file_io.DASH else pairs.parent
+        ready = prepared_sites(order, folder, otherwise, wanted.surface_cache)
     else:
-        batches.write(ready, output, wanted)
+        ready = prepared(order)
+    batches.write(ready, output, wanted)
 
 
 def _check_together(

@@ -14,6 +14,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.text_lines import TextLines
 from dmpcli.records.untrusted import decoder
 
 MAGIC = b"Format Version,"
@@ -56,7 +57,7 @@ def read(source: Source) -> Table:
     kept = [i for i in range(at + 1, len(every)) if every[i].strip()]
     body = "\n".join(every[i] for i in kept).encode()
     lines = np.array(kept, dtype=np.int64) + 1
-    columns = tables.body_columns(body, names, b",", lines, source.name)
+    columns = tables.body_columns(TextLines(body, 0, len(body), lines), names, b",", source.name)
     remarks = ["Motive's axes are taken as they are: y is up unless it was exported otherwise"]
     kind = take.get("Rotation Type", "Quaternion")
     if kind.lower() != "quaternion":

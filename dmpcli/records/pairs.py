@@ -1,16 +1,17 @@
 """Start-goal pairs from CSV or Parquet: every row is kept, bad ones with what is wrong."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
-from dmpcli.records import tables
+from dmpcli.records import pair_places, schemas, tables
 from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
+from dmpcli.records.pair_places import PairPlaces
 from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table
 from dmpcli.records.untrusted import decoder
@@ -28,6 +29,9 @@ FARTHEST = 1e6
 
 LARGEST_ANGLE = 1e3
 """Angles beyond this, rad, are a mistake."""
+
+KNOWN = ("id", *START, *GOAL, *START_ANGLES, *GOAL_ANGLES, "duration", *pair_places.COLUMNS)
+"""Columns that are read."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,10 @@ class PairTable:
         s; NaN where the table does not say.
     status : array of str, shape (B,)
         ``ok``, or what is wrong with the row, with its place in the file.
+    places : PairPlaces, optional
+        Where the table itself says on which surface each pair lies.
+    unknown : list of str
+        Columns that nobody reads.
     """
 
     name: str
@@ -55,6 +63,8 @@ class PairTable:
     lines: Integers | None
     duration: Floats
     status: list[str]
+    places: PairPlaces | None = None
+    unknown: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -75,8 +85,8 @@ class PairTable:
 def read(source: Source) -> PairTable:
     """Read a table with the columns ``x0 y0 z0 xg yg zg`` and what else it has.
 
-    Optional are ``id``, ``duration`` (s) and the orientations ``rx0 ry0 rz0``, ``rxg ryg rzg``
-    (X-Y-Z Euler angles, rad).
+    Optional are ``id``, ``duration`` (s), the orientations ``rx0 ry0 rz0``, ``rxg ryg rzg``
+    (X-Y-Z Euler angles, rad), and where each pair lies, see `pair_places`.
 
     Raises
     ------
@@ -91,6 +101,8 @@ def read(source: Source) -> PairTable:
         duration = table.floats("duration")
         bad = ~table.empty("duration") & ~(np.isfinite(duration) & (duration > 0))
         _mark(table, status, bad, "duration", "is not a positive time in s")
+    # A table of pairs that a batch ended with has more of its own, which mean no harm here.
+    known = (*KNOWN, *schemas.PAIRS.columns)
     return PairTable(
         source.name,
         _ids(table),
@@ -103,6 +115,8 @@ def read(source: Source) -> PairTable:
         table.lines,
         duration,
         status,
+        pair_places.read(table, status),
+        [name for name in table.columns if name not in known],
     )
 
 

@@ -225,7 +225,7 @@ def header(record: Record) -> bytes:
     p = record.provenance
     entries = {
         "schema": record.schema.name,
-        "version": record.schema.version,
+        "version": record.schema.version_of(record.columns),
         "tool": p.tool,
         "command": p.command,
         "options": p.options,

@@ -21,6 +21,7 @@ from dmpcli.records import (
     stamps,
     tables,
 )
+from dmpcli.records.columns import all_within
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Layout, LayoutColumn
 from dmpcli.records.pairs import FARTHEST
@@ -39,6 +40,9 @@ LONGEST = 1e6
 
 SHORTEST_STEP = 1e-6
 """Rows nearer to each other than this, s, are in another unit of time."""
+
+SHORTEST_GAP = 5e-10
+"""No recorder counts finer than ns: single rows nearer than this, s, are no two times."""
 
 LARGEST_TURN = 4 * np.pi
 """Angles beyond this, rad, are in degrees."""
@@ -432,6 +436,12 @@ def _check_time(table: Table, t: Floats, name: str) -> None:
             f"{table.name}: column {name!r}: rows are {step:.3g} s apart; "
             "check the unit of time (--time-unit)"
         )
+    if np.any(steps < SHORTEST_GAP):
+        row = int(np.argmax(steps < SHORTEST_GAP)) + 1
+        raise InputError(
+            f"{table.name}: column {name!r}, {table.at(row)}: comes {steps[row - 1]:.3g} s after "
+            "the row before; mend or remove the row, or check the unit of time (--time-unit)"
+        )
     if np.any(steps > LONGEST_GAP * step):
         row = int(np.argmax(steps)) + 1
         raise InputError(
@@ -455,9 +465,8 @@ def _repeated(steps: Floats) -> str:
 
 
 def _check_position(table: Table, position: Floats) -> None:
-    beyond = np.abs(position).max(axis=1) > FARTHEST
-    if beyond.any():
-        row = int(np.argmax(beyond))
+    if not all_within(position, FARTHEST):
+        row = int(np.argmax(np.abs(position).max(axis=1) > FARTHEST))
         raise InputError(
             f"{table.name}: {table.at(row)}: the position is beyond {FARTHEST:g} mm; check the "
             "unit of length (--length-unit)"

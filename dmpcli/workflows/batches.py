@@ -5,13 +5,14 @@ from pathlib import Path
 
 from dmpcli.batch.part import Job
 from dmpcli.batch.run import Batch, Shard, Summary
+from dmpcli.batch.site import SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.feasibility import snapped
 from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
-from dmpcli.messages import progress, tell, warn
+from dmpcli.messages import progress, tell, tell_as, warn
 from dmpcli.records import file_io, trajectory
-from dmpcli.records.pairs import PairTable
+from dmpcli.records.pairs import KNOWN, PairTable
 from dmpcli.records.record import Form
 from dmpcli.records.schemas import OK
 from dmpcli.settings.batch import BatchOptions
@@ -38,14 +39,25 @@ def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
     task, table, duration = ready.task, ready.table, ready.duration
     if not table.good.any():
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
-    drawable = table.pairs[table.good.nonzero()[0]]
-    seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
-    facts = ready.provenance.facts | trajectory.facts_of(seen, task.style, heights)
-    facts |= {"rate": task.style.rate}
+    facts = ready.provenance.facts | {"rate": task.style.rate}
+    if ready.sites is None:
+        drawable = table.pairs[table.good.nonzero()[0]]
+        seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
+        facts |= trajectory.facts_of(seen, task.style, heights)
     form = Form(wanted.float32, wanted.compression)
-    job = Job(task, wanted.stop, replace(ready.provenance, facts=facts), form, str(output))
+    p = replace(ready.provenance, facts=facts)
+    job = Job(task, wanted.stop, p, form, str(output), ready.prepare)
     pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
-    batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, Shard(*wanted.share))
+    batch = Batch(
+        job,
+        table,
+        pairs,
+        duration,
+        wanted.pairs_per_part,
+        Shard(*wanted.share),
+        ready.sites,
+        wanted.surfaces_per_part,
+    )
     draw_with = _workers(wanted)
     first = table.good.nonzero()[0][:1]
     with about("skill"):
@@ -70,7 +82,28 @@ def _workers(wanted: BatchOptions) -> Draw:
     return workers.here
 
 
+def tell_of_unknown(table: PairTable) -> None:
+    """Say once which columns of a table nobody reads."""
+    if table.unknown:
+        tell(
+            f"{table.name}: {', '.join(map(repr, table.unknown))}: no such column is known, and "
+            f"none is read but {', '.join(KNOWN)}"
+        )
+
+
+def _tell_of_sites(told: SitesTold) -> None:
+    """Say what was odd about the surfaces of a table, once what was so for several."""
+    loud = sorted(told.first, key=lambda key: -key[0])
+    for level, text in loud[:SHOWN]:
+        more = told.count[level, text] - 1
+        name = told.first[level, text] + (f" and {more} more" if more else "")
+        tell_as(level, f"{name}: {text}")
+    if len(loud) > SHOWN:
+        tell(f"and {len(loud) - SHOWN} more remarks on surfaces")
+
+
 def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> None:
+    _tell_of_sites(summary.told)
     if summary.unfolded:
         warn(
             f"{counted(summary.unfolded, 'stroke')} across a sharp crease, where no tool can "

@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.extras import SVG
+from dmpcli.extras import ROS, SVG
+from dmpcli.formats import mcap_file
 from dmpcli.records import record, schemas
 from dmpcli.records.file_io import read as read_file
 from tests.extras_here import needs
@@ -174,3 +175,22 @@ def test_what_does_not_fit_is_refused(tmp_path, name, text, options, words):
     assert done.exit_code == 2, done.stderr
     assert words in done.stderr
     assert not (tmp_path / "d.parquet").exists()
+
+
+@needs(ROS)
+def test_a_place_that_no_reader_of_demonstrations_takes_is_refused(tmp_path):
+    one = wave()
+    one.position[3, 2] = 1e12
+    (tmp_path / "o.mcap").write_bytes(mcap_file.encode(motion(one)))
+    done = run("import", tmp_path / "o.mcap", "-o", tmp_path / "b.parquet")
+    assert done.exit_code == 2
+    assert "sample 4: the position is beyond" in done.stderr
+    assert not (tmp_path / "b.parquet").exists()
+
+
+def test_a_program_of_days_is_refused_with_the_rate_that_would_do(tmp_path):
+    path = tmp_path / "o.ngc"
+    path.write_text("G21 G90\nG1 X0 Y0 F1e-3\nG1 X900 Y0\n")
+    done = run("import", path, "-o", tmp_path / "b.parquet")
+    assert done.exit_code == 2
+    assert "lower --rate" in done.stderr
