@@ -3,6 +3,7 @@
 #   make setup       the environment .venv, from pinned versions
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
+#   make reproduce-force  force on surfaces that are not where the plan has them, in physics
 #   make test        tests, lint, types and import rules
 #   make test-quick  the quick half of the tests
 #   make lint        ruff, mypy and import-linter
@@ -44,8 +45,8 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help setup docs reference demo reproduce test test-quick coverage test-lowest lint lock dist bench peers judges faults \
-    soak mutations mutants cluster-demo samples pictures schemas clean FORCE
+.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick coverage test-lowest lint lock dist bench peers \
+    judges faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -148,7 +149,8 @@ JUDGES := $(OUT)/judges/venv
 judges:
 	@sh tools/set_up.sh "$(PYTHON)" "$(JUDGES)" "$(LOCK)" "$(OUT)"
 	$(JUDGES)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/judges.txt
-	DMPCLI_JUDGES=required $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
+	@sh tools/linuxcnc.sh $(OUT)/judges/linuxcnc
+	DMPCLI_JUDGES=required DMPCLI_LINUXCNC=$(OUT)/judges/linuxcnc $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
 	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py
 
 # One seed replays one failure: python -m tests.faults --seed N.
@@ -236,6 +238,15 @@ reproduce: $(REPORTS) $(STROKES:%=$(R)/%/tables.txt) $(R)/drag/report/report.jso
 	done
 	@printf '\n== Admittance drag and built-in drag (Figures 3 and 4) ==\n'
 	@cat $(R)/drag/tables.txt
+
+# Needs dmpcli[bench], which the environment of the tests has; SEEDS=5.
+
+SEEDS ?= 5
+
+reproduce-force: export OPENBLAS_NUM_THREADS := 1
+reproduce-force: $(VENV)/installed
+	@mkdir -p $(R)
+	$(BIN)/python -m benchmarks.force surfaces --seeds $(SEEDS) | tee $(R)/force.md
 
 define FIT_RULES
 $(R)/$(1)/$(2).json: sample_runs/$(1).parquet | $(VENV)/installed
