@@ -70,8 +70,8 @@ class ContactPolicy:
     clamp: float = 15.0
     rate: float = 10.0
     limit: float = 2.0
-    drag: float = 3.0
-    rub: float = 0.6
+    drag: float = 2.0
+    rub: float = 0.4
     patience: float = 0.06
     on_loss: OnContactLoss = "seek"
     delay: float = 0.05
