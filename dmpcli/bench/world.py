@@ -131,6 +131,12 @@ class World:
         return angles
 
     @property
+    def speeds(self) -> Floats:
+        """Actual speeds of the joints, shape (6,), rad/s."""
+        found: Floats = self._data.qvel[:6].copy()
+        return found
+
+    @property
     def pose(self) -> Pose:
         """Actual pose of the TCP, by the joints: the end of the pen as if nothing pressed it."""
         data, rotation = self._data, self._data.site_xmat[self._tcp].reshape(3, 3)

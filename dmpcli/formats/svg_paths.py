@@ -29,6 +29,10 @@ MOST_POINTS = 2_000_000
 FARTHEST = 1e9
 """Pixels, which are more than 100 m in any unit."""
 
+MOST_DIGITS = 64
+"""Of a number: what the library takes for one grows with their third power."""
+_LONG = re.compile(rb"[0-9]{%d}" % (MOST_DIGITS + 1))
+
 _SHARP = np.radians(10.0)
 """A turn of more than this is a corner, which a sample hits."""
 
@@ -71,6 +75,13 @@ def decode(
     """
     if len(source.content) > LARGEST:
         raise InputError(f"{source.name}: is larger than {LARGEST >> 20} MiB; simplify the drawing")
+    long = _LONG.search(source.content)
+    if long is not None:
+        line = source.content.count(b"\n", 0, long.start()) + 1
+        raise InputError(
+            f"{source.name}: line {line}: a number of more than {MOST_DIGITS} digits; export the "
+            "drawing again"
+        )
     (svgelements,) = extras.load(SVG, source.name, "svgelements")
     drawing = _parsed(svgelements, source)
     sized = _has_size(source.content)

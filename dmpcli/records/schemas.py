@@ -50,6 +50,7 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+DRAWN_ON = ("drawn_on", "surface_sha256")
 JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6", "q7")
 """Of an arm with fewer joints the first ones; no arm with more is logged."""
 

@@ -13,11 +13,9 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
-from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
+from dmpcli.records.schemas import DRAWN_ON, EULER_ANGLES, NORMAL, POSITION
 from dmpcli.spatial import output_events, rotations
 from dmpcli.spatial.output_events import OutputEvent
-
-DRAWN_ON = ("drawn_on", "surface_sha256")
 
 LEAST_HEIGHT = 1e-9
 """A stroke that begins and ends nearer to the surface than this is on it, mm."""

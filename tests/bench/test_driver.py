@@ -37,8 +37,12 @@ def test_robot_and_sensor_keep_the_protocols():
     for arm in ("ec66", "ur5e"):
         robot, sensor, clock = instruments(f"bench://{arm}?surface=none", f"bench://{arm}")
         servo = servo_adapter.servo(robot, clock, tool)
-        check_servo(servo, clock, clock.sleep_until)
-        check_sensor(sensor, clock, clock.sleep_until)
+
+        def wait(duration, clock=clock):
+            clock.sleep_until(clock.now() + duration)
+
+        check_servo(servo, clock, wait)
+        check_sensor(sensor, clock, wait)
 
 
 def test_both_share_one_bench_of_one_clock():
