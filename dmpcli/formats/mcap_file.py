@@ -11,7 +11,8 @@ from dmpcli import extras
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats import ros_messages
-from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.formats.motion import Motion
+from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.formats.ros_messages import MessageReader
 from dmpcli.records import untrusted
 from dmpcli.version import __version__
@@ -48,7 +49,7 @@ def encode(motion: Motion) -> bytes:
     return sink.getvalue()
 
 
-def read(path: Path, name: str, body: str | None = None) -> tuple[MotionStroke, list[str]]:
+def read(path: Path, name: str, body: str | None = None) -> tuple[PoseBlocks, list[str]]:
     """Read the poses of a file, one chunk at a time.
 
     Parameters
@@ -68,7 +69,7 @@ def read(path: Path, name: str, body: str | None = None) -> tuple[MotionStroke, 
         return decode(stream, name, body)
 
 
-def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[MotionStroke, list[str]]:
+def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[PoseBlocks, list[str]]:
     """Read the poses of an open file; see `read`."""
     (reading,) = extras.load(ROS, name, "mcap.reader")
     found = MessageReader(name, body)

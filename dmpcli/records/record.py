@@ -1,7 +1,8 @@
 """A record: one Parquet file between the stages, its columns as arrays and its provenance."""
 
+import contextlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -135,8 +136,48 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
     OSError
         It cannot be written.
     """
+    store_groups([record], sink, form)
+
+
+def store_groups(records: Iterable[Record], sink: Any, form: Form | None = None) -> None:
+    """Write rows that come in groups, each a record of its own, as one Parquet file.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        At least one, of the same columns; the first one's provenance is the file's.
+    sink
+        A path, or an open Arrow or Python file.
+    form : Form, optional
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
     form = form or Form()
-    fields, arrays = [], []
+    with contextlib.ExitStack() as stack:
+        writer = None
+        for record in records:
+            if writer is None:
+                schema = _arrow_schema(record, form)
+                kinds = {f.name: pa.types.is_floating(f.type) for f in schema}
+                writer = stack.enter_context(
+                    pq.ParquetWriter(
+                        sink,
+                        schema,
+                        compression=form.compression,
+                        use_byte_stream_split=[name for name, floats in kinds.items() if floats],
+                        use_dictionary=[name for name, floats in kinds.items() if not floats],
+                        write_page_checksum=True,
+                    )
+                )
+            arrays = [_arrow(record.columns[field.name], field.type) for field in schema]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def _arrow_schema(record: Record, form: Form) -> Any:
+    fields = []
     for name, column in record.schema.columns.items():
         if name not in record.columns:
             if column.required:
@@ -144,21 +185,9 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
             continue
         single = form.single and column.type == "double" and column.unit != "s"
         kind = pa.float32() if single else TYPES[column.type]
-        arrays.append(_arrow(record.columns[name], kind))
-        fields.append(
-            pa.field(name, kind, metadata={"unit": column.unit, "meaning": column.meaning})
-        )
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={KEY: header(record)}))
-    floats = [f.name for f in fields if pa.types.is_floating(f.type)]
-    others = [f.name for f in fields if not pa.types.is_floating(f.type)]
-    pq.write_table(
-        table,
-        sink,
-        compression=form.compression,
-        use_byte_stream_split=floats,
-        use_dictionary=others,
-        write_page_checksum=True,
-    )
+        metadata = {"unit": column.unit, "meaning": column.meaning}
+        fields.append(pa.field(name, kind, metadata=metadata))
+    return pa.schema(fields, metadata={KEY: header(record)})
 
 
 def repeated(texts: Sequence[str], counts: int | Sequence[int]) -> Any:
