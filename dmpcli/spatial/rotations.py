@@ -351,11 +351,21 @@ def from_quaternion(q: Floats) -> Floats:
     if q.ndim == 2 and len(q) > _IN_CACHE:
         whole: Floats = np.empty((len(q), 3, 3))
         for first in range(0, len(q), _IN_CACHE):
-            whole[first : first + _IN_CACHE] = from_quaternion(q[first : first + _IN_CACHE])
+            part = slice(first, first + _IN_CACHE)
+            _from_quaternion(q[part], whole[part])
         return whole
+    return _from_quaternion(q, np.empty((*q.shape[:-1], 3, 3)))
+
+
+def _from_quaternion(q: Floats, R: Floats) -> Floats:
+    """Fill R with 1 + 2 (w K + K K)."""
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     K = skew(q[..., :3])
-    R: Floats = np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)
+    np.matmul(K, K, out=R)
+    K *= q[..., 3, None, None]
+    R += K
+    R *= 2.0
+    R += np.eye(3)
     return R
 
 
