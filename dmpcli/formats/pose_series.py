@@ -181,7 +181,7 @@ class PoseBlocks:
             values = self._poses.rows(rows)
             q = values[:, 3:]
             R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-            t: Floats = (stamps - self._zero) * 1e-9
+            t: Floats = np.asarray((stamps - self._zero) * 1e-9, dtype=float)
             yield MotionStroke(t, values[:, :3] * 1000.0, R, wrench=self._felt(stamps))
 
     def _felt(self, stamps: Any) -> Floats | None:

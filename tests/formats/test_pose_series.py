@@ -14,9 +14,7 @@ from dmpcli.errors import InputError
 from dmpcli.formats import pose_series
 from dmpcli.formats.pose_series import PoseBlocks, Series
 from dmpcli.records import record
-from dmpcli.spatial import rotations
 from dmpcli.workflows.import_file import demonstrations
-from tests.formats.motions import angle_between
 
 
 def rows_of(count, seed=0):
@@ -95,25 +93,6 @@ def test_a_full_disk_is_told_with_the_folder_that_can_be_changed(monkeypatch):
     monkeypatch.setattr(pose_series.tempfile, "TemporaryFile", full)
     with pytest.raises(InputError, match=r"No space left.*TMPDIR"):
         series(np.arange(9), rows_of(9)[0])
-
-
-@pytest.mark.parametrize("size", [7, 50, 1000])
-def test_angles_go_on_from_block_to_block_as_along_the_whole_path(size):
-    rows, _ = rows_of(300)
-    R = rotations.from_quaternion(rows[:, 3:])
-    whole = rotations.to_euler_continuous(R)
-    angles, last = [], None
-    for first in range(0, len(R), size):
-        part = R[first : first + size]
-        angles.append(
-            rotations.to_euler_continuous(part)
-            if last is None
-            else rotations.to_euler_continued(part, *last)
-        )
-        last = part[-1], angles[-1][-1]
-    joined = np.concatenate(angles)
-    np.testing.assert_allclose(joined, whole, atol=1e-12)
-    assert angle_between(rotations.from_euler(joined), R).max() < 1e-9
 
 
 def test_a_file_in_groups_holds_what_a_file_in_one_does_and_a_single_group_its_bytes(monkeypatch):
