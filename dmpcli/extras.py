@@ -1,7 +1,8 @@
 """The optional packages: what each extra is for, and where its wheels exist.
 
-The one list of them: the message of a command that misses one, README's table, and the tests that
-are passed over where there is no wheel are made from it; pyproject.toml names the same packages.
+The one list of them: the message of a command that misses one, the table of docs/install.md, and
+the tests that are passed over where there is no wheel are made from it; pyproject.toml names the
+same packages.
 """
 
 import importlib
@@ -131,7 +132,7 @@ def _where(extra: Extra) -> str:
 
 
 def table() -> str:
-    """Return README's table of extras."""
+    """Return the table of extras in docs/install.md."""
     lines = ["| extra | for | installs | wheels |", "| --- | --- | --- | --- |"]
     for extra in EXTRAS:
         packages = ", ".join(extra.packages)

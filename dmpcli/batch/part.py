@@ -45,6 +45,8 @@ class Job:
         Where the parts go; every process that draws must see it.
     prepare : callable, optional
         Makes pairs ready whose table names their surfaces; `task` then has none.
+    nested : bool
+        Whether there are so many parts that they lie in several folders.
     """
 
     task: Task
@@ -53,6 +55,11 @@ class Job:
     form: Form
     folder: str
     prepare: Prepare | None = None
+    nested: bool = False
+
+    def file_of(self, number: int) -> str:
+        """Return the name of a part's file."""
+        return file_io.part_name(number, self.nested)
 
 
 @dataclass(frozen=True)
@@ -85,16 +92,6 @@ class Part:
 
     def __len__(self) -> int:
         return len(self.rows)
-
-    @property
-    def file(self) -> str:
-        """Name of the part's file."""
-        return file_of(self.number)
-
-
-def file_of(number: int) -> str:
-    """Return the name of a part's file."""
-    return f"part-{number:05d}.parquet"
 
 
 PieceEnds = tuple[list[float], list[float], float]
@@ -164,6 +161,32 @@ class Outcome:
             found["sites"] = self.sites
             found["placed"] = {str(row): place for row, place in self.placed.items()}
         return found
+
+
+def outcome_of(fact: Mapping[str, Any], rows: int, size: int) -> Outcome:
+    """Return the outcome of a part that was drawn, from its own fact.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        It is not what `Outcome.fact` makes.
+    """
+
+    def by_row(name: str) -> dict[int, Any]:
+        return {int(row): value for row, value in fact.get(name, {}).items()}
+
+    return Outcome(
+        int(fact["number"]),
+        by_row("failed"),
+        by_row("clipped"),
+        int(fact["unfolded"]),
+        rows,
+        size,
+        pieces=by_row("pieces"),
+        slow=int(fact.get("slow", 0)),
+        placed=by_row("placed"),
+        sites=list(fact.get("sites", ())),
+    )
 
 
 FACT = "part"
@@ -430,12 +453,14 @@ def _ends(piece: DrawnStroke) -> PieceEnds:
 def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:
     facts = drawn.provenance.facts | {FACT: outcome.fact()}
     drawn = replace(drawn, provenance=replace(drawn.provenance, facts=facts))
-    file = Path(job.folder) / part.file
+    file = Path(job.folder) / job.file_of(part.number)
     temporary: Path | None = None
     try:
         # Another machine may draw the same part: a name that nobody else has. Not flushed to the
         # disk one by one: after a power cut a part can be drawn again, and the manifest tells its
         # size.
+        if job.nested:
+            file.parent.mkdir(exist_ok=True)
         temporary, stream = file_io.temporary_of(file)
         with stream:
             record.store(drawn, stream, job.form)

@@ -17,6 +17,7 @@ from dmpcli.errors import InstrumentError
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
 from dmpcli.instruments.protocols import Clock, Sample, SensorInfo
+from dmpcli.records import file_io
 from dmpcli.spatial.rotations import to_euler
 
 _EPS = 1e-9
@@ -93,6 +94,12 @@ class Bench:
         while self._coming and self._coming[0].t <= now + _EPS:
             arrived.append(self._coming.popleft())
         return arrived
+
+    def keep_truth(self) -> None:
+        """Write what truly happened, where it is asked for."""
+        world = self._world
+        if world is not None and world.truth is not None and world.parameters.truth is not None:
+            file_io.write(str(world.parameters.truth), world.truth.encoded())
 
     def _due(self) -> float:
         return self._streaming_since + (self._taken + 1) * self._every
@@ -176,8 +183,9 @@ class BenchArm:
         self._started = False
 
     def close(self) -> None:
-        """Stand still."""
+        """Stand still; the truth is written where the URL names a file for it."""
         self.stop()
+        self._bench.keep_truth()
 
 
 class BenchSensor:

@@ -73,6 +73,10 @@ class JointReference:
         """Head for a set-point that has arrived at time `t`, s, once the delay has passed."""
         self._coming.append((t + self._delay, np.array(joints, dtype=float)))
 
+    def lead(self, joints: Floats, duration: float) -> None:
+        """Head for joint angles, shape (6,), rad, evenly within `duration` s and at once."""
+        self._head_for(np.array(joints, dtype=float), duration)
+
     def advance(self, t: float, most: int) -> Motion:
         """Go on by some steps of the grid, as far as nothing changes meanwhile.
 
@@ -89,7 +93,7 @@ class JointReference:
             At the end of each step.
         """
         while self._coming and self._steps_to(self._coming[0][0] - t) <= 0:
-            self._head_for(self._coming.popleft()[1])
+            self._head_for(self._coming.popleft()[1], self._period)
         n = min(most, _MOST)
         if self._left:
             n = min(n, self._left)
@@ -117,6 +121,6 @@ class JointReference:
         """Steps that begin before `wait` s have passed."""
         return math.ceil(wait / self._step - _EPS)
 
-    def _head_for(self, joints: Floats) -> None:
-        self._target, self._left = joints, max(round(self._period / self._step), 1)
+    def _head_for(self, joints: Floats, duration: float) -> None:
+        self._target, self._left = joints, max(round(duration / self._step), 1)
         self._rate = (joints - self._command) / (self._left * self._step)

@@ -18,7 +18,7 @@ COLLISIONS = ("closest", "hfield", "sdf")
 _MOST_CELLS = 1_000_000
 
 
-def read(path: Path, frame: Pose, tip: Floats, collision: str, grid: float) -> Nothing:
+def read(path: Path, frame: Pose, tip: Pose, collision: str, grid: float) -> Nothing:
     """Read a surface file in the base frame, and make a workpiece of it where the file has it.
 
     Parameters
@@ -27,8 +27,8 @@ def read(path: Path, frame: Pose, tip: Floats, collision: str, grid: float) -> N
         What `dmpcli.records.surface.load` reads.
     frame : Pose
         Of the workpiece: where it is displaced and tilted about.
-    tip : array, shape (3,)
-        Where the pen stands, mm; the surface faces it.
+    tip : Pose
+        Of the pen where it stands at first; the surface faces it.
     collision : str
     grid : float
         Of a height field, mm.
@@ -43,14 +43,14 @@ def read(path: Path, frame: Pose, tip: Floats, collision: str, grid: float) -> N
     from dmpcli.records.mesh import MeshFile
 
     found = surface_file.load(file_io.read(path), pose=frame.inverse())
-    pen = frame.apply_inverse(tip[None])
+    pen, axis = frame.apply_inverse(tip.position[None]), frame.rotation.T @ tip.rotation[:, 2]
     if not isinstance(found, MeshFile):
         if collision != "closest":
             raise InputError(f"{path}: collide={collision}: is for meshes; leave it out")
-        if isinstance(found, Plane) and ((pen[0] - found.point) @ found.normal) < 0.0:
+        if isinstance(found, Plane) and found.normal @ axis > 0.0:
             found = Plane(found.point, -found.normal)
         return Traced(frame, found)
-    V, F = found.V, _facing(found.V, found.F, pen)
+    V, F = found.V, _facing(found.V, found.F, pen, axis)
     if collision == "hfield":
         heights, half = heights_of(V, F, grid)
         return HeightField(frame, heights, half)
@@ -61,10 +61,10 @@ def read(path: Path, frame: Pose, tip: Floats, collision: str, grid: float) -> N
     return Traced(frame, Mesh(V, F))
 
 
-def _facing(V: Floats, F: Integers, pen: Floats) -> Integers:
-    """Return the faces with their normals on the side of the pen where that is nearest."""
-    hit = Mesh(V, F).closest(pen)
-    return F if float((pen[0] - hit.position[0]) @ hit.normal[0]) >= 0.0 else F[:, ::-1]
+def _facing(V: Floats, F: Integers, pen: Floats, axis: Floats) -> Integers:
+    """Return the faces with their normals against the pen's axis where it stands."""
+    normal = Mesh(V, F).closest(pen).normal[0]
+    return F if normal @ axis < 0.0 else F[:, ::-1]
 
 
 def heights_of(V: Floats, F: Integers, grid: float) -> tuple[Floats, tuple[float, float]]:

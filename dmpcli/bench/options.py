@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dmpcli.arrays import Floats
 from dmpcli.bench import scene
 from dmpcli.bench.mesh_workpieces import COLLISIONS, read
 from dmpcli.bench.parameters import BenchParameters, JointServos, Pen, WristSensor
@@ -115,7 +114,8 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
         bias=np.concatenate([bias, np.zeros(3)]),
         latency=number("latency", 0.0, 0.0, 1.0, "s"),
     )
-    read = BenchParameters(
+    truth = options.text("truth")
+    read_from = BenchParameters(
         arm=arm,
         position=position,
         rotation=rotation,
@@ -123,12 +123,13 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
         pen=pen,
         servos=servos,
         sensor=sensor,
-        workpiece=_workpiece(options, position),
+        workpiece=_workpiece(options, Pose(position, rotation)),
         step=number("step", 0.0, 1e-5, 2e-3, "s") or None,
         seed=options.whole("seed", 0, 0, 2**31 - 1),
+        truth=None if truth is None else Path(truth),
     )
     options.done()
-    return read
+    return read_from
 
 
 _ANGLES = ("rx", "ry", "rz")
@@ -145,13 +146,13 @@ def _tool(options: Options, usual: Tool) -> Tool:
     return tool_file.decode(file_io.read(Path(path)))
 
 
-def _workpiece(options: Options, tip: Floats) -> Workpiece:
+def _workpiece(options: Options, tip: Pose) -> Workpiece:
     number = options.number
     shape = options.text("surface") or "plane"
     point = np.array(
         [
             number(f"at_{key}", float(value), -_FAR, _FAR, "mm")
-            for key, value in zip("xyz", tip, strict=True)
+            for key, value in zip("xyz", tip.position, strict=True)
         ]
     )
     normal = np.array([number(f"n{key}", float(key == "z"), -1.0, 1.0, "") for key in "xyz"])
@@ -169,7 +170,7 @@ def _workpiece(options: Options, tip: Floats) -> Workpiece:
     return replace(_shape(options, shape, frame, tip), pose=moved(frame, offset, tilt, about))
 
 
-def _shape(options: Options, shape: str, frame: Pose, tip: Floats) -> Nothing:
+def _shape(options: Options, shape: str, frame: Pose, tip: Pose) -> Nothing:
     """The surface where the plan has it."""
     number = options.number
     radius = number("radius", 60.0, 1.0, 1e4, "mm")

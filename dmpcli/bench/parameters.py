@@ -1,6 +1,7 @@
 """What the bench is made of; every number with its unit."""
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -118,6 +119,8 @@ class BenchParameters:
         Of the physics, s. None: 1 ms, halved until the pen's spring is slow beside it.
     seed : int
         Of the sensor's noise.
+    truth : Path, optional
+        A Parquet file to keep what truly happened in.
     """
 
     arm: str = "ec66"
@@ -130,6 +133,7 @@ class BenchParameters:
     workpiece: Workpiece = field(default_factory=Flat)
     step: float | None = None
     seed: int = 0
+    truth: Path | None = None
 
     @property
     def grid(self) -> float:

@@ -15,6 +15,7 @@ from dmpcli.arrays import Floats
 from dmpcli.bench import scene
 from dmpcli.bench.joint_servos import JointReference
 from dmpcli.bench.parameters import FASTEST, BenchParameters
+from dmpcli.bench.truth import Truth
 from dmpcli.bench.workpiece import Traced
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics import chain, inverse
@@ -53,6 +54,8 @@ class World:
         How far the physics has come, s, from 0.
     reference : JointReference
         Where the servos lead the joints to.
+    truth : Truth or None
+        What happened, where the parameters ask for it.
 
     Raises
     ------
@@ -65,6 +68,8 @@ class World:
     def __init__(self, parameters: BenchParameters | None = None) -> None:
         self.parameters = parameters = parameters or BenchParameters()
         self._step = parameters.grid
+        self._setpoints = 0
+        self.truth = Truth() if parameters.truth is not None else None
         if parameters.pen.pace * self._step > FASTEST:
             raise InputError(
                 f"bench: a step of {self._step:g} s is too long for a pen of "
@@ -126,6 +131,12 @@ class World:
         return angles
 
     @property
+    def speeds(self) -> Floats:
+        """Actual speeds of the joints, shape (6,), rad/s."""
+        found: Floats = self._data.qvel[:6].copy()
+        return found
+
+    @property
     def pose(self) -> Pose:
         """Actual pose of the TCP, by the joints: the end of the pen as if nothing pressed it."""
         data, rotation = self._data, self._data.site_xmat[self._tcp].reshape(3, 3)
@@ -185,6 +196,7 @@ class World:
     def send(self, joints: Floats) -> None:
         """Head for joint angles, shape (6,), rad."""
         self.reference.send(self.t, joints)
+        self._setpoints += 1
 
     def stand_still(self) -> None:
         """Hold the joints where they are."""
@@ -265,9 +277,13 @@ class World:
         # Before the next contacts are found, to which these forces would not belong.
         self._feel_contacts()
         if self._traced is not None:
+            mujoco.mj_kinematics(model, data)
             self._trace(self._traced)
         mujoco.mj_step1(model, data)
         self._steps += 1
+        if self.truth is not None:
+            push = float(np.linalg.norm(self._pushing))
+            self.truth.add(self.t, self._setpoints, self.tip, self.contact_force, push)
 
     def _feel_contacts(self) -> None:
         """Add up what the contacts push with, and rub with it during the next step."""

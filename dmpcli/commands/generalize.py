@@ -1,7 +1,8 @@
 """``dmpcli generalize``: a skill and new start-goal pairs in, trajectories out."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +13,10 @@ from dmpcli.messages import on_terminal, tell
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
 from dmpcli.settings.options import Given, choice, with_options
+
+if TYPE_CHECKING:
+    from dmpcli.records.pairs import PairTable
+    from dmpcli.workflows.generalize import Ready
 
 
 @with_options
@@ -79,7 +84,7 @@ def command(
     """Draw a skill at new start and goal points."""
     on_terminal(quiet)
     from dmpcli.commands import batches as batch_options
-    from dmpcli.records import file_io, learned_skill
+    from dmpcli.records import file_io, learned_skill, pair_stream
     from dmpcli.records import pairs as pair_file
     from dmpcli.records.record import encode
     from dmpcli.workflows import batches, process, single, surface_input
@@ -92,10 +97,15 @@ def command(
         from dmpcli.batch import process_pool
 
         process_pool.begin()
-    source = table = None
+    table = stream = None
+    sha256 = ""
     if pairs is not None:
-        source = file_io.read(pairs)
-        table = pair_file.read(source)
+        stream = pair_stream.opened(pairs)
+        if stream is not None:
+            table, sha256 = stream.first(), stream.sha256
+        else:
+            source = file_io.read(pairs)
+            table, sha256 = pair_file.read(source), source.sha256
     # A table may name surfaces itself, or some of them.
     named = surface or (pairs if table is not None and table.places is not None else None)
     _check_together(pairs, (start_orientation, goal_orientation), named, given)
@@ -116,9 +126,8 @@ def command(
         table = one_pair(start, goal, start_orientation, goal_orientation)
         options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
-        assert source is not None
         options = wanted.as_options(sites)
-        inputs.append({"role": "pairs", "sha256": source.sha256})
+        inputs.append({"role": "pairs", "sha256": sha256})
     order = Order(
         learned,
         table,
@@ -138,18 +147,24 @@ def command(
         file_io.write(output, encode(drawn.record))
         tell(f"{file_io.shown(output, output=True)}: {drawn.said}")
         return
-    batches.tell_of_unknown(table)
-    if sites:
+
+    def ready_of(some: "PairTable") -> "Ready":
+        if not sites:
+            return prepared(replace(order, table=some, inputs=list(inputs)))
         from dmpcli.workflows.generalize_sites import Otherwise, prepared_sites
 
         otherwise = Otherwise(
             None if surface is None else str(surface), surface_pose, surface_unit, place.in_
         )
         folder = Path() if str(pairs) == file_io.DASH else pairs.parent
-        ready = prepared_sites(order, folder, otherwise, wanted.surface_cache)
-    else:
-        ready = prepared(order)
-    batches.write(ready, output, wanted)
+        mine = replace(order, table=some, inputs=list(inputs))
+        return prepared_sites(mine, folder, otherwise, wanted.surface_cache)
+
+    if stream is not None:
+        batches.write_pieces(stream, ready_of, output, wanted)
+        return
+    batches.tell_of_unknown(table)
+    batches.write(ready_of(table), output, wanted)
 
 
 def _check_together(

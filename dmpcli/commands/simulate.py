@@ -75,6 +75,12 @@ def command(
         setting = _on(surface, surface_pose, surface_unit, setting)
     elif surface_pose is not None or surface_unit is not None:
         raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
+    if served.physics == "mujoco":
+        from dataclasses import replace
+
+        from dmpcli.bench.lab_arm import BenchArm
+
+        setting = replace(setting, physics=BenchArm)
     ports = Ports(
         served.sensor_port,
         served.http_port,

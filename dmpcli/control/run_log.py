@@ -33,6 +33,10 @@ class Row:
         Compensated, at the TCP, base axes.
     coupling : float
         e of eq. (10), mm.
+    force : float
+        F_d of eq. (10), N.
+    contact : str
+        State of the contact.
     state, phase : str
     id : str or None
         The stroke that the set-point lies on; None on the way to, from and between strokes.
@@ -56,7 +60,11 @@ class Row:
     id: str | None = None
     joints: Floats | None = None
     event: str = ""
+    force: float = 0.0
+    contact: str = ""
 
+
+CONTACT = "contact"
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
 _POSES = (("planned", "plan"), ("sent", "sent"), ("actual", ""))
@@ -94,10 +102,12 @@ class RunLog:
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
-        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
+        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1, "fn": 1} if coupled else {})
         self._joints = joints if joints <= len(JOINTS) else 0
         groups |= {"joints": self._joints} if self._joints else {}
-        self._texts = ("state", "phase", "id", *([EVENT] if switching else []))
+        texts = [EVENT] if switching else []
+        self._texts = ("state", "phase", "id", *texts, *([CONTACT] if coupled else []))
+        self._switching = switching
         self.rows = RowBuffer(groups, self._texts)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
@@ -118,15 +128,15 @@ class RunLog:
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
-            felt += (row.coupling,)
+            felt += (row.coupling, row.force)
         if self._joints:
             told = row.joints is not None and len(row.joints) == self._joints
             felt += (row.joints if told and row.joints is not None else np.nan,)
         times = (row.t, row.t_plan, row.deadline, row.lateness)
-        self.rows.add(
-            (clock, *times, *planned, *row.sent, *row.actual, *felt),
-            (row.state, row.phase, row.id or "", row.event)[: len(self._texts)],
-        )
+        words = [row.state, row.phase, row.id or ""]
+        words += [row.event] if self._switching else []
+        words += [row.contact] if self._coupled else []
+        self.rows.add((clock, *times, *planned, *row.sent, *row.actual, *felt), words)
 
     def columns(self) -> dict[str, AnyArray]:
         """Return the columns of the run file, each of shape (rows,)."""
@@ -151,11 +161,13 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out |= _split(rows.numbers("wrench"), WRENCH, "")
     if "coupling" in rows.groups:
         out["coupling"] = rows.numbers("coupling")
+    if "fn" in rows.groups:
+        out["fn"] = rows.numbers("fn")
     if "joints" in rows.groups:
         angles = rows.numbers("joints").reshape(len(rows), -1)
         out |= dict(zip(JOINTS, angles.T, strict=False))
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
-    for name in ("id", EVENT):
+    for name in ("id", EVENT, CONTACT):
         if name in rows.texts:
             out[name] = np.array([word or None for word in rows.words(name)], dtype=object)
     return out

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
+from dmpcli.arrays import Floats
 from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import (
     ControlLoop,
@@ -26,7 +27,7 @@ from dmpcli.control.plan_cursor import PlanCursor
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.control.signals import Interruption
 from dmpcli.control.step_limits import StepLimits, check_start
-from dmpcli.errors import DmpError, InputError, RefusedError
+from dmpcli.errors import DmpError, InputError, RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Pose
@@ -96,6 +97,7 @@ class PlanLoop(ControlLoop):
         self.plan, self._then = plan, deque(then)
         self.period, self.duration = plan.period, plan.period * sum(map(len, (plan, *then)))
         self.drawn: list[str] = []
+        self._short: dict[str, float] = {}
         self.pressing: ForceTracker | None = touch.pressing if touch else None
         if self.pressing is not None and not self.STREAMS:
             raise InputError(
@@ -126,6 +128,7 @@ class PlanLoop(ControlLoop):
         how, failure = self._run()
         if self._cursor.braking:
             how = how or "decelerated along the path"
+        failure = failure or self._untouched()
         outcome = self._outcome(how, failure, DONE)
         if self._outputs is None or not self._outputs.left:
             return outcome
@@ -135,6 +138,23 @@ class PlanLoop(ControlLoop):
     def _leave(self) -> None:
         if self._outputs is not None:
             self._outputs.leave()
+
+    def _untouched(self) -> DmpError | None:
+        """Return why what was drawn does not count, though nothing else went wrong."""
+        pressing = self.pressing
+        if pressing is None or self._interruption.count:
+            return None
+        if pressing.failure:
+            return RefusedError(pressing.failure)
+        if not self._short:
+            return None
+        name, share = next(iter(self._short.items()))
+        least = pressing.supervisor.policy.least_share
+        more = f", and {len(self._short) - 1} more" if len(self._short) > 1 else ""
+        return RefusedError(
+            f"stroke {name} was in contact on {beside(100.0 * share, 100.0 * least, '.1f')} % of "
+            f"it, under {100.0 * least:g} % (--min-contact){more}: it does not count as drawn"
+        )
 
     @property
     def virtual(self) -> bool:
@@ -154,7 +174,7 @@ class PlanLoop(ControlLoop):
             self._advance()
         if self._interruption.count > 1:
             raise StoppedAtOnce("stopped at once at the second signal")
-        if self._interruption.count or self._hindrance() is not None:
+        if self._interruption.count or self._hindrance() is not None or self._lost:
             self._switched += self._outputs.off() if self._outputs is not None else ""
             self._brake()
         setpoint = self._setpoint(cycle)
@@ -164,6 +184,11 @@ class PlanLoop(ControlLoop):
             when = cycle.due + late + self._owed * self._period
             self._outputs.reach(self.plan, self._cursor.index, when)
         return setpoint
+
+    @property
+    def _lost(self) -> bool:
+        """Whether the force coupling has given up."""
+        return self.pressing is not None and bool(self.pressing.failure)
 
     @abstractmethod
     def _brake(self) -> None:
@@ -176,6 +201,7 @@ class PlanLoop(ControlLoop):
     def _goes_on(self, cycle: Cycle) -> bool:
         """Go on until the last plan has ended, or the brake, and the arm stands still."""
         over = self._cursor.finished and (not self._then or self._cursor.braking)
+        over = over and self._clear()
         self._rested = over and self._rest.reached(cycle.state)
         if self._outputs is not None and self._outputs.waiting:
             self._rested = False  # the arm is on its way to where something is switched
@@ -185,6 +211,10 @@ class PlanLoop(ControlLoop):
                 self._arrival.check_rest(cycle.state, self._last)
             return False
         self._advance()
+        return True
+
+    def _clear(self) -> bool:
+        """Whether the tool has come off the work as far as it shall."""
         return True
 
     def _advance(self) -> None:
@@ -230,7 +260,11 @@ class PlanLoop(ControlLoop):
             return
         if self._arrival.arrived:
             self._counted = True
-            self.drawn.append(self.plan.id)
+            share = 1.0 if self.pressing is None else self.pressing.tally.share(self.plan.id)
+            if self.pressing and share < self.pressing.supervisor.policy.least_share:
+                self._short[self.plan.id] = share
+            else:
+                self.drawn.append(self.plan.id)
         elif over and self._arrival.looked:
             self._arrival.refuse()
 
@@ -256,6 +290,8 @@ class PlanLoop(ControlLoop):
                 lateness=cycle.late if lateness is None else lateness,
                 wrench=cycle.wrench,
                 coupling=self.pressing.e if self.pressing and draws else 0.0,
+                force=self.pressing.wanted(index) if self.pressing else 0.0,
+                contact=self.pressing.supervisor.state if self.pressing else "",
                 state=state.mode,
                 phase=self._cursor.phase,
                 id=self.plan.id if draws else None,
@@ -275,16 +311,23 @@ class ServoLoop(PlanLoop):
     def _enter(self) -> None:
         super()._enter()
         self._steps = StepLimits(self._limits, self._period)
+        self._over = 0.0  # s since the last plan ended
 
     def _brake(self) -> None:
         """Decelerate along the path from now on, if any of it is left."""
         if self._then or not self._cursor.finished:
             self._cursor.brake()
 
-    def _check(self, cycle: Cycle) -> None:
-        super()._check(cycle)
-        if self.pressing is not None and self._cursor.waiting and self.pressing.given_up:
-            raise RefusedError(f"{self.pressing.given_up}; check surface and sensor")
+    def _clear(self) -> bool:
+        """Whether a coupled tool is off the work: led by its plan, or lifted where that ends."""
+        pressing, cursor = self.pressing, self._cursor
+        if pressing is None or cursor.braking or self.plan.last < len(self.plan) - 1:
+            return True
+        self._over += self._period
+        beyond = self._over - self._arm.info.lookahead
+        if beyond > -1e-9:
+            self._count(over=beyond > self.PATIENCE)
+        return pressing.supervisor.retreated
 
     def _setpoint(self, cycle: Cycle) -> Pose:
         pressing, cursor = self.pressing, self._cursor
@@ -292,12 +335,24 @@ class ServoLoop(PlanLoop):
             cursor.release()
         index = cursor.index
         position, rotation = self.plan.at(index)
-        if pressing is not None and index > self.plan.last:
-            position = position + pressing.leave(index)
-        elif pressing is not None and index >= self.plan.lead:
-            if cycle.wrench is None or cursor.braking:
-                position = position + pressing.hold(index)
-            else:
-                position = position + pressing.displace(index, cycle.wrench)
+        if pressing is not None:
+            position = position + self._pressed(pressing, cycle, index)
+            if pressing.supervisor.urgent:
+                raise RefusedError(pressing.failure)
         self._steps.check(self._last, position, rotation)
         return position, rotation
+
+    def _pressed(self, pressing: ForceTracker, cycle: Cycle, index: float) -> Floats:
+        """Return what the force coupling adds to the set-point, shape (3,), mm."""
+        plan, cursor, t = self.plan, self._cursor, cycle.due
+        if cursor.braking:
+            return pressing.hold(index)
+        if index > plan.last:
+            return pressing.leave(index, t)
+        if index < plan.lead:
+            return pressing.come(index, cycle.wrench, t)
+        if cursor.finished and self._counted:
+            return pressing.retreat(index, t)
+        if cycle.wrench is None:
+            return pressing.hold(index)
+        return pressing.displace(index, cycle.wrench, t)

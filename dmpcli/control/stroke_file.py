@@ -170,6 +170,13 @@ def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -
         raise InputError(f"{source.name}: stroke {name} has one row; a motion needs at least two")
     one = stored(source, name, rows, source.provenance.facts | dict(more))
     stroke = PlannedStroke(
-        name, one.t, one.position, one.rotation, one.normal, one.first_row, one.events
+        name,
+        one.t,
+        one.position,
+        one.rotation,
+        one.normal,
+        one.first_row,
+        one.events,
+        one.force,
     )
     return FoundStroke(stroke, one.facts)

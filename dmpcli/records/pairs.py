@@ -55,6 +55,8 @@ class PairTable:
         Where the table itself says on which surface each pair lies.
     unknown : list of str
         Columns that nobody reads.
+    before : int
+        Rows of the file before these, where it is read in pieces.
     """
 
     name: str
@@ -65,13 +67,14 @@ class PairTable:
     status: list[str]
     places: PairPlaces | None = None
     unknown: list[str] = field(default_factory=list)
+    before: int = 0
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def place(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     @property
     def good(self) -> Booleans:
@@ -93,7 +96,17 @@ def read(source: Source) -> PairTable:
     InputError
         The file cannot be read, holds no rows, lacks a column, or two rows have one id.
     """
-    table = tables.read(source)
+    return decoded(tables.read(source))
+
+
+def decoded(table: Table) -> PairTable:
+    """Return a table, or a piece of one, as pairs; see `read`.
+
+    Raises
+    ------
+    InputError
+        As `read`.
+    """
     status = [OK] * len(table)
     start, goal = _three(table, START, status), _three(table, GOAL, status)
     duration = np.full(len(table), np.nan)
@@ -104,7 +117,7 @@ def read(source: Source) -> PairTable:
     # A table of pairs that a batch ended with has more of its own, which mean no harm here.
     known = (*KNOWN, *schemas.PAIRS.columns)
     return PairTable(
-        source.name,
+        table.name,
         _ids(table),
         Pairs(
             start,
@@ -117,6 +130,7 @@ def read(source: Source) -> PairTable:
         status,
         pair_places.read(table, status),
         [name for name in table.columns if name not in known],
+        table.before,
     )
 
 
@@ -155,7 +169,7 @@ def _rotations(table: Table, names: tuple[str, ...], status: list[str]) -> Float
 
 def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
-        return [str(row + 1) for row in range(len(table))]
+        return [str(table.before + row + 1) for row in range(len(table))]
     ids = table.texts("id")
     odd = next((row for row, name in enumerate(ids) if _CONTROL.search(name)), None)
     if odd is not None:

@@ -4,7 +4,7 @@ Lengths, angles and times of other makes are converted here, at the edge, and wh
 them is told.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,11 +15,14 @@ from dmpcli.records import (
     layouts,
     motive,
     plausibility,
+    qualisys,
     record,
     rotation_forms,
     schemas,
     stamps,
     tables,
+    trc,
+    vicon,
 )
 from dmpcli.records.columns import all_within
 from dmpcli.records.file_io import Source
@@ -67,12 +70,15 @@ class Recording:
         What is likely wrong with it, with the remedy.
     ours : bool
         Whether it is a file of this program's, which tells its units and angles.
+    wrench : array, shape (T, 6), or None
+        On the tool, at the TCP, base axes, N and N·m, where it was asked for and is there.
     """
 
     stroke: Trajectory
     told: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     ours: bool = False
+    wrench: Floats | None = None
 
 
 @dataclass
@@ -123,7 +129,7 @@ class _Reading:
 
 
 @decoder
-def read(source: Source, layout: Layout | None = None) -> Recording:
+def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> Recording:
     """Read a demonstration for learning.
 
     Parameters
@@ -132,6 +138,8 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
         One of our demonstration files, or any CSV or Parquet table.
     layout : Layout, optional
         Of another program's table; one of ours tells its own.
+    wrench : bool
+        Whether a wrench is wanted too, as `export` writes it: fx ... tz with N and N·m beside.
 
     Raises
     ------
@@ -146,7 +154,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
         stroke = Trajectory(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
-        return Recording(stroke, ours=True)
+        return Recording(stroke, ours=True, wrench=_own_wrench(ours) if wrench else None)
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
@@ -156,6 +164,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
+    felt = _wrench(reading) if wrench else None
     stroke = Trajectory(t, position, rotation)
     if "sample_rate" not in given.said:
         stroke = _without_repeats(reading, stroke, name)
@@ -163,12 +172,31 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     _check_position(reading.table, stroke.position)
     _doubt_units(reading, stroke)
     reading.doubts += rotation_forms.unread(reading.names, reading.taken)
-    return Recording(stroke, tuple(reading.told), tuple(reading.doubts))
+    if felt is not None and len(felt) != len(stroke.t):
+        felt = None
+        reading.told.append("the wrench is left out: rows with one stamp were made one")
+    return Recording(stroke, tuple(reading.told), tuple(reading.doubts), wrench=felt)
 
 
 def stroke(source: Source, layout: Layout | None = None) -> Trajectory:
     """Read a demonstration, see `read`, without what there is to say of it."""
     return read(source, layout).stroke
+
+
+def export_of(source: Source) -> tuple[str, Table] | None:
+    """Read an export that tells itself by its first lines; None where it is none.
+
+    Returns
+    -------
+    str, Table
+        The layout that reads it, and what it holds.
+    """
+    if motive.is_motive(source):
+        return "motive", motive.read(source)
+    for kind in (vicon, qualisys, trc):
+        if kind.matches(source):
+            return kind.LAYOUT, kind.read(source)
+    return None
 
 
 def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
@@ -177,6 +205,15 @@ def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
         if not layout.columns:
             raise InputError(f"{source.name}: is an export of Motive; --layout motive reads it")
         return motive.read(source), layout
+    export = export_of(source)
+    if export is not None:
+        name, table = export
+        if layout.columns:
+            return table, layout
+        remark = f"recognised as --layout {name}; another --layout or --map says else"
+        given = {key: getattr(layout, key) for key in layout.said if key != "map"}
+        known = layouts.adapted(LAYOUTS[name], (), given)
+        return replace(table, remarks=(remark, *table.remarks)), known
     names = layout.header if "header" in layout.said else ()
     try:
         return tables.read(source, names, layout.decimal, episodes.NAMES), layout
@@ -221,6 +258,11 @@ def _headless(error: HeadlessError, commented: list[str] | None) -> str:
         return f"the names of the columns are commented out; {how} reads them"
     likely = {
         3: "--columns x,y,z --sample-rate HZ",
+        10: "--layout ros --columns header.stamp.sec,header.stamp.nanosec,header.frame_id,"
+        "pose.position.x,pose.position.y,pose.position.z,pose.orientation.x,pose.orientation.y,"
+        "pose.orientation.z,pose.orientation.w (ros2 topic echo --csv of a PoseStamped)",
+        12: "--layout kitti --sample-rate HZ (KITTI: a pose matrix row by row, no time)",
+        13: "--columns t,r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z --rotation matrix",
         4: "--columns t,x,y,z",
         7: "--columns t,x,y,z,rx,ry,rz",
         8: "--layout tum (t x y z qx qy qz qw)",
@@ -262,6 +304,33 @@ def _ros_time(reading: _Reading, column: LayoutColumn) -> Floats:
     unit = "ns" if whole and "time" not in reading.layout.said else reading.layout.time
     reading.units["time"] = unit
     return stamps.seconds(reading.table, column.name, unit)
+
+
+def _own_wrench(ours: record.Record) -> Floats | None:
+    if not ours.has(*schemas.WRENCH):
+        return None
+    values = ours.stack(schemas.WRENCH)
+    return None if np.isnan(values).any() else values
+
+
+def _wrench(reading: _Reading) -> Floats | None:
+    """Wrench of each row, shape (T, 6); None where no columns hold one in N and N·m, as ours do."""
+    found = {layouts.parted(name): name for name in reading.names}
+    wanted = [(name, "N" if name in schemas.FORCE else "N·m") for name in schemas.WRENCH]
+    if not all(key in found for key in wanted):
+        if all(any(parted[0] == name for parted in found) for name in schemas.WRENCH):
+            reading.told.append(
+                "fx ... tz are not read: [N] and [N·m] in their names would say that they are the "
+                "wrench on the tool, at the TCP, in base axes"
+            )
+        return None
+    names = [found[key] for key in wanted]
+    empty = np.any([reading.table.empty(name) for name in names])
+    if empty:
+        reading.told.append("the wrench is left out: it is not known in every row")
+        return None
+    reading.told.append("fx ... tz read as the wrench on the tool, at the TCP, in base axes")
+    return np.column_stack([reading.table.numbers(name) for name in names])
 
 
 def _position(reading: _Reading) -> Floats:

@@ -50,6 +50,7 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+DRAWN_ON = ("drawn_on", "surface_sha256")
 JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6", "q7")
 """Of an arm with fewer joints the first ones; no arm with more is logged."""
 
@@ -101,7 +102,8 @@ TRAJECTORY = Schema(
     }
     | _pose("planned TCP")
     | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL}
-    | {EVENT: Column("1", "outputs switched from this row to the next", "string", False, since=2)},
+    | {EVENT: Column("1", "outputs switched from this row to the next", "string", False, since=2)}
+    | {"fn": Column("N", "force along the normal, 0 lifted", required=False, since=2)},
 )
 
 RUN = Schema(
@@ -122,6 +124,8 @@ RUN = Schema(
     | _wrench("compensated wrench on the tool, at the TCP, base axes")
     | {
         "coupling": Column("mm", "e of eq. (10), along the normal", required=False),
+        "fn": Column("N", "force along the normal to press with, 0 lifted", required=False),
+        "contact": Column("1", "state of the contact", "string", False),
         "state": Column("1", "robot state", "string"),
         "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
         "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),

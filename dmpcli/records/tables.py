@@ -60,6 +60,8 @@ class Table:
         The decimal sign of its text.
     remarks : tuple of str
         What a person should know of how it was read.
+    before : int
+        Rows of the file before these, where it is read in pieces.
     """
 
     name: str
@@ -67,13 +69,14 @@ class Table:
     lines: Integers | None = None
     decimal: str = "."
     remarks: tuple[str, ...] = ()
+    before: int = 0
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def at(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     def numbers(self, column: str) -> Floats:
         """Return a column as finite numbers, shape (rows,).
@@ -213,11 +216,15 @@ def read(
 
 
 def _parquet(source: Source) -> Table:
-    table = parquet.table(source)
+    return of_arrow(source.name, parquet.table(source))
+
+
+def of_arrow(name: str, table: Any, before: int = 0) -> Table:
+    """Return an Arrow table, perhaps a piece of a file, as a `Table`."""
     columns: dict[str, Any] = {}
-    for name in table.column_names:
-        columns |= list_columns.expanded(name, table.column(name).combine_chunks())
-    return Table(source.name, columns)
+    for column in table.column_names:
+        columns |= list_columns.expanded(column, table.column(column).combine_chunks())
+    return Table(name, columns, before=before)
 
 
 def _csv(
@@ -228,7 +235,7 @@ def _csv(
     separator = _separator(header, body.rest().text(_LONGEST_LINE))
     names = _cells(header, separator)
     untrusted.judge_columns(source.name, len(names), names)
-    headless = bool(names) and all(map(_is_number, names))
+    headless = _are_values(names)
     if headless and not given:
         raise HeadlessError(source.name, int(numbers[0]), len(names))
     remarks = []
@@ -397,6 +404,12 @@ def _separator(header: bytes, body: bytes) -> bytes:
 
 def _is_number(cell: str) -> bool:
     return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
+
+
+def _are_values(cells: Sequence[str]) -> bool:
+    """Tell a row from names: numbers, among them a word or two such as a frame's name."""
+    numbers = sum(map(_is_number, cells))
+    return bool(cells) and (numbers == len(cells) or (numbers > 3 and len(cells) - numbers <= 2))
 
 
 def named(given: Sequence[str], count: int, source: str) -> list[str]:

@@ -1,6 +1,7 @@
 """The lines of a text table that count, without copying the text: files may have gigabytes."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +38,12 @@ class TextLines:
     end: int
     numbers: Integers
 
+    @classmethod
+    def kept(cls, every: Sequence[str], kept: Sequence[int]) -> "TextLines":
+        """Join the lines of these places, counted from 0 in the file."""
+        content = "\n".join([every[place] for place in kept]).encode()
+        return cls(content, 0, len(content), np.array(kept, dtype=np.int64) + 1)
+
     def __len__(self) -> int:
         return self.end - self.begin
 
@@ -72,6 +79,21 @@ class TextLines:
     def reader(self) -> Any:
         """Return an Arrow file of the text, which copies nothing."""
         return pa.BufferReader(pa.py_buffer(self.content).slice(self.begin, len(self)))
+
+
+def every_line(source: Source) -> list[str]:
+    """Lines of a text file, however they end; without the empty ones at its end.
+
+    Raises
+    ------
+    InputError
+        It is not text in UTF-8.
+    """
+    try:
+        text = source.content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source.name}: is not text in UTF-8") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
 
 
 def counted_lines(source: Source) -> TextLines:

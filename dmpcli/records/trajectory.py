@@ -13,11 +13,9 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
-from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
+from dmpcli.records.schemas import DRAWN_ON, EULER_ANGLES, NORMAL, POSITION
 from dmpcli.spatial import output_events, rotations
 from dmpcli.spatial.output_events import OutputEvent
-
-DRAWN_ON = ("drawn_on", "surface_sha256")
 
 LEAST_HEIGHT = 1e-9
 """A stroke that begins and ends nearer to the surface than this is on it, mm."""
@@ -117,6 +115,9 @@ def trajectory_record(
     if any(s.normal is not None and len(s.normal) > 1 for s in strokes):
         normal = np.concatenate([_normals(s) for s in strokes])
         columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
+    forces = [s.force for s in strokes if s.force is not None]
+    if forces:
+        columns["fn"] = np.concatenate(forces)
     if events:
         texts = [
             text
@@ -155,6 +156,8 @@ def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record
         columns |= {name: _column(block.euler[..., i]) for i, name in enumerate(EULER_ANGLES)}
     if block.normal is not None and block.normal.shape[1] > 1:
         columns |= {name: _column(block.normal[..., i]) for i, name in enumerate(NORMAL)}
+    if block.force is not None:
+        columns["fn"] = np.tile(block.force, count)
     return Record(schemas.TRAJECTORY, columns, p)
 
 

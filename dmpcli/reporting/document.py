@@ -68,6 +68,8 @@ class DocumentPart:
         Of more than `MOST_ROWS` strokes.
     many : MeasuredBatch, optional
         Such a batch as measured; then `strokes` are those of them that are drawn.
+    ids : list of str
+        Of the strokes of a smaller batch.
     """
 
     name: str
@@ -81,6 +83,7 @@ class DocumentPart:
     states: dict[str, int] | None = None
     batch: BatchFolder | None = None
     many: MeasuredBatch | None = None
+    ids: list[str] = field(default_factory=list)
 
 
 def lesson_for(parts: Sequence[DocumentPart], sha256: str) -> Lesson | None:

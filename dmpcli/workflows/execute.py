@@ -41,6 +41,7 @@ from dmpcli.workflows.run_output import (
     interruptible,
     refuse_replacing,
 )
+from dmpcli.workflows.told_later import ContactTeller
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,11 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    if not presses and "force_setpoint" in said:
-        raise InputError("--force-setpoint: nothing presses without --coupling force")
+    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+        if option in said and not presses:
+            raise InputError(
+                f"--{option.replace('_', '-')}: nothing presses without --coupling force"
+            )
     for option in ("max_force", "max_torque"):
         if option in said and not (feels or presses):
             raise InputError(
@@ -186,6 +190,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
+    teller = ContactTeller(realtime and request.presses and keeper is not None)
     try:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
@@ -199,13 +204,15 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
-        loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
+        loop = _loop(
+            bench, arm, judged, settings, request, coupling, tool_file, keeper, batch, teller
+        )
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
-        provenance.facts.update(execution.facts_of(arm, coupling, settings))
+        provenance.facts.update(execution.facts_of(arm, coupling))
         outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
-        closing = guards.leave(robot.close, bench.sensor.close, lock.release)
+        closing = guards.leave(robot.close, bench.sensor.close, lock.release, teller.close)
     with stopping.outranking(lambda: outcome.stop):
         if realtime:
             tell(str(loop.timing))
@@ -294,6 +301,8 @@ def _loop(
     coupling: Filter | None,
     tool_file: Source | None,
     keeper: RunOutput,
+    batch: StrokeSelection,
+    teller: ContactTeller,
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
@@ -301,7 +310,12 @@ def _loop(
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
-        touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+        policy = None
+        if coupling is not None:
+            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+        touch = execution.touch(
+            bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller
+        )
     watch = execution.watch(settings)
     kind: type[PlanLoop] = ServoLoop
     if isinstance(arm.servo, PlanPlayer):

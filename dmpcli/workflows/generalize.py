@@ -129,6 +129,11 @@ def prepared(order: Order) -> Ready:
     process.check_skill(settings, skill, table, order.keep_out)
     table = process.copied(table, settings)
     given = None if read is None else facing_tool(read.surface, skill, table, str(read.path))
+    if settings.force_setpoint is not None and settings.offset > 0.0:
+        raise InputError(
+            f"--force-setpoint: nothing presses at --offset {settings.offset:g} mm off the "
+            "surface; leave one of them out"
+        )
     style = style_of(settings.style(), skill, given, settings.contact, settings.offset)
     style = process.process_style(style, settings, order.on_border, given, order.keep_out, inputs)
     said = mark(skill, skill.name)

@@ -5,7 +5,7 @@ where its pairs are drawn, and what stands against it, or against pairs on it, i
 """
 
 import os
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +49,7 @@ from dmpcli.workflows.surface_input import SurfaceInput, placed_input
 
 _POSE = "column 'pose'"
 
-_MOST_FACES = 150_000
+_MOST_FACES = 100_000
 """Meshes of so many faces together are held for the next pairs on them."""
 
 
@@ -111,12 +111,17 @@ def prepared_sites(
     said_mark = mark(skill, skill.name)
     if said_mark is not None:
         warn(said_mark)
-    sites = _sites(table, folder, otherwise, settings.offset)
+    sites = sites_of(table, folder, otherwise, settings.offset)
     bad = np.flatnonzero(~table.good)
     if order.stop and len(bad):
         raise InputError(f"{table.name}: {table.status[bad[0]]}")
     work = SiteWork(
-        skill, settings, order.on_border, order.keep_out, reach, MeshStore(_text(cache))
+        skill,
+        settings,
+        order.on_border,
+        order.keep_out,
+        reach,
+        SurfaceReader(MeshStore(_text(cache))),
     )
     return Ready(
         Task(skill.plain(), None, settings.style(), reach, asked_events(settings)),
@@ -140,8 +145,19 @@ def _said_pose(given: str) -> list[float] | str:
     return [float(word) for word in given.split()] if source is None else source.sha256
 
 
-def _sites(table: PairTable, folder: Path, otherwise: Otherwise, offset: float) -> PairSites:
-    """Make files of the table's words; what is wrong with them goes into the rows' status."""
+def sites_of(table: PairTable, folder: Path, otherwise: Otherwise, offset: float) -> PairSites:
+    """Make files of a table's words; what is wrong with them goes into the status of its rows.
+
+    Parameters
+    ----------
+    table : PairTable
+        With places.
+    folder : Path
+        That relative names start from.
+    otherwise : Otherwise
+    offset : float
+        Where the table says none, mm.
+    """
     places = table.places
     assert places is not None
     sites: list[Site] = []
@@ -207,7 +223,53 @@ def _mark(table: PairTable, places: PairPlaces, i: int, why: str) -> None:
             table.status[row] = f"{table.place(row)}, pair {table.ids[row]}: {why}"
 
 
-@dataclass
+class SurfaceReader:
+    """Reads the surfaces of sites, and holds the last ones.
+
+    Parameters
+    ----------
+    store : MeshStore
+    """
+
+    def __init__(self, store: MeshStore) -> None:
+        self.store = store
+        self._open: dict[Site, SurfaceInput] = {}
+
+    def __reduce__(self) -> tuple[type["SurfaceReader"], tuple[MeshStore]]:
+        # What is held stays; another process begins with nothing.
+        return type(self), (self.store,)
+
+    def read(self, site: Site) -> tuple[SurfaceInput, list[Remark]]:
+        """Return a surface as placed, and what is told of it when it is read from its file.
+
+        Raises
+        ------
+        InputError
+            It cannot be read or placed.
+        """
+        key = replace(site, axes="", offset=0.0)
+        if key in self._open:
+            self._open[key] = self._open.pop(key)
+            return self._open[key], []
+        name = site.surface.name
+        with heard() as told:
+            at: tuple[Pose, Source | None] | None = None
+            if isinstance(site.pose, SiteFile):
+                source = site.pose.read()
+                at = pose.decode(source)[0], source
+            elif site.pose is not None:
+                at = pose.parse(site.pose, _POSE)
+            words = site.pose if isinstance(site.pose, str) else None
+            read = placed_input(
+                site.surface.read(), words, at, site.unit, f"{name}, {_POSE}", self.store
+            )
+        self._open[key] = read
+        while len(self._open) > 1 and sum(map(_faces, self._open.values())) > _MOST_FACES:
+            del self._open[next(iter(self._open))]
+        return read, _remarks(name, told)
+
+
+@dataclass(frozen=True)
 class SiteWork:
     """Makes pairs ready that lie on surfaces of their own; see `Prepare`.
 
@@ -219,11 +281,7 @@ class SiteWork:
     on_border: OnBorder
     keep_out: Path | None
     reach: Reach | None
-    store: MeshStore
-    _open: dict[Site, SurfaceInput] = field(default_factory=dict, repr=False)
-
-    def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"_open": {}}
+    reader: SurfaceReader
 
     def __call__(
         self, site: Site, ids: list[str], pairs: Pairs, duration: Floats
@@ -236,7 +294,12 @@ class SiteWork:
             The surface cannot be read or placed, or none of its pairs can be drawn.
         """
         skill, settings, name = self.skill, self.settings, site.surface.name
-        read, remarks = self._read(site)
+        if settings.force_setpoint is not None and site.offset > 0.0:
+            raise InputError(
+                f"--force-setpoint: nothing presses at an offset of {site.offset:g} mm off the "
+                "surface; leave one of them out"
+            )
+        read, remarks = self.reader.read(site)
         table = PairTable(name, ids, pairs, None, duration, [OK] * len(ids))
         with heard() as told:
             if site.axes == "part":
@@ -267,29 +330,6 @@ class SiteWork:
             ),
             remarks + _remarks(name, told),
         )
-
-    def _read(self, site: Site) -> tuple[SurfaceInput, list[Remark]]:
-        """Return a surface as placed, from those that are held or from its file."""
-        key = replace(site, axes="", offset=0.0)
-        if key in self._open:
-            self._open[key] = self._open.pop(key)
-            return self._open[key], []
-        name = site.surface.name
-        with heard() as told:
-            at: tuple[Pose, Source | None] | None = None
-            if isinstance(site.pose, SiteFile):
-                source = site.pose.read()
-                at = pose.decode(source)[0], source
-            elif site.pose is not None:
-                at = pose.parse(site.pose, _POSE)
-            words = site.pose if isinstance(site.pose, str) else None
-            read = placed_input(
-                site.surface.read(), words, at, site.unit, f"{name}, {_POSE}", self.store
-            )
-        self._open[key] = read
-        while len(self._open) > 1 and sum(map(_faces, self._open.values())) > _MOST_FACES:
-            del self._open[next(iter(self._open))]
-        return read, _remarks(name, told)
 
 
 def _faces(read: SurfaceInput) -> int:

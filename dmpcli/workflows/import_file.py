@@ -22,7 +22,7 @@ from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
 from dmpcli.settings.import_file import ImportOptions
 from dmpcli.spatial.rotations import interpolate, to_euler_continued, to_euler_continuous
-from dmpcli.workflows.recording import recording
+from dmpcli.workflows.recording import whole
 
 NAME, ID = "{name}", "{id}"
 """In the name of an output: the input's, without suffix, and that of each of its strokes."""
@@ -227,8 +227,9 @@ def strokes_of(
         It cannot be read.
     """
     if kind == TABLE:
-        stroke = recording(source, form)
-        return [MotionStroke(stroke.t, stroke.position, stroke.rotation)]
+        found = whole(source, form, wrench=True)
+        stroke = found.stroke
+        return [MotionStroke(stroke.t, stroke.position, stroke.rotation, wrench=found.wrench)]
     if kind == "svg":
         from dmpcli.formats import svg_paths
 

@@ -18,7 +18,7 @@ from dmpcli.reporting import tracking
 from dmpcli.spatial import output_events
 from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_euler, interpolate
-from dmpcli.workflows.recording import recording
+from dmpcli.workflows.recording import recording, whole
 
 BATCH = "batch"
 
@@ -54,8 +54,9 @@ def motion_in(path: Path, layout: Layout | None = None) -> tuple[Motion, dict[st
 def motion_of(source: Source, layout: Layout | None = None) -> Motion:
     """Return the strokes of a file; see `motion_in`."""
     if not record.is_ours(source):
-        stroke = recording(source, layout)
-        one = MotionStroke(stroke.t, stroke.position, stroke.rotation)
+        read = whole(source, layout, wrench=True)
+        stroke = read.stroke
+        one = MotionStroke(stroke.t, stroke.position, stroke.rotation, wrench=read.wrench)
         return Motion(source.name, schemas.DEMONSTRATION.name, [one])
     found = record.decode(source)
     if found.schema is schemas.DEMONSTRATION:

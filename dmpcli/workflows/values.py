@@ -143,6 +143,7 @@ def of_record(found: Record, source: Source | None = None) -> DrawnTrajectory | 
         one.first_row,
         one.facts,
         one.events,
+        one.force,
         found,
         source,
     )
@@ -258,6 +259,8 @@ def record_of(one: Trajectory) -> Record:
     if one.normal is not None:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
         columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
+    if isinstance(one, StoredTrajectory) and one.force is not None:
+        columns["fn"] = one.force
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
 
 

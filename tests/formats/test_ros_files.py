@@ -1,5 +1,6 @@
 """MCAP and ROS 2 bags: what other readers find in ours, and ours in theirs."""
 
+import functools
 import io
 import struct
 
@@ -227,3 +228,26 @@ def test_metadata_nested_without_end_are_refused_before_they_are_parsed(tmp_path
     path.write_text(path.read_text().replace("custom_data:", f"custom_data: {'[' * 50_000}"))
     with pytest.raises(InputError, match="nested too deep"):
         ros_bag.read(tmp_path / "bag")
+
+
+def test_messages_come_chunk_by_chunk_and_not_all_at_once(monkeypatch):
+    from mcap import stream_reader, writer
+
+    from dmpcli.formats.ros_messages import MessageReader
+
+    small = functools.partial(writer.Writer, chunk_size=400)
+    monkeypatch.setattr(writer, "Writer", lambda sink, chunk_size: small(sink))
+    content = mcap_file.encode(motion(wave(samples=60)))
+    opened, seen = [], []
+    broken, take = stream_reader.breakup_chunk, MessageReader.take
+    monkeypatch.setattr(
+        stream_reader, "breakup_chunk", lambda chunk: opened.append(1) or broken(chunk)
+    )
+    monkeypatch.setattr(
+        MessageReader, "take", lambda *given: seen.append(len(opened)) or take(*given)
+    )
+    back, _ = read(content)
+    same(back, wave(samples=60))
+    assert len(opened) > 10
+    assert seen[0] <= 2
+    assert max(np.diff(seen)) <= 2

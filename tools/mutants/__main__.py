@@ -27,6 +27,9 @@ from typing import Any
 from tools.mutants import choice, operators, reach, trial
 
 ROOMS = ("dmp", "admittance", "surfaces", "metrics", "planning", "control")
+OTHERS = ("records", "reporting", "calibration", "batch")
+"""Rooms whose tests judge too: they call the six in their own process."""
+
 OUT = Path("out/mutants")
 EQUIVALENT = Path(__file__).parent / "equivalent.toml"
 
@@ -34,15 +37,34 @@ Row = dict[str, Any]
 
 
 def measured(tests: list[str], anew: bool) -> reach.Reach:
-    """What each folder's tests reach in the rooms, measured in processes of their own."""
-    kept = [OUT / "reach" / (folder.replace("/", "-") + ".json") for folder in tests]
-    for folder, path in zip(tests, kept, strict=True):
-        if anew or not path.exists():
-            print(f"running {folder} under coverage", flush=True)
-            command = [sys.executable, "-m", "tools.mutants", "--measure", folder]
-            if subprocess.run(command, check=False).returncode:
-                raise SystemExit(f"{folder}: the tests fail as they are; mend them first")
+    """What each folder's tests reach in the rooms, measured in processes of their own.
+
+    Files of tests that were changed since their folder was measured are measured by themselves.
+    """
+    kept: list[Path] = []
+    for folder in tests:
+        whole = _kept(folder)
+        if anew or not whole.exists():
+            _measure(folder)
+        kept.append(whole)
+        for file in sorted(Path(folder).rglob("test_*.py")):
+            own, changed = _kept(str(file)), file.stat().st_mtime
+            if changed > whole.stat().st_mtime:
+                if not own.exists() or changed > own.stat().st_mtime:
+                    _measure(str(file))
+                kept.append(own)
     return reach.read(kept)
+
+
+def _kept(tests: str) -> Path:
+    return OUT / "reach" / (tests.replace("/", "-") + ".json")
+
+
+def _measure(tests: str) -> None:
+    print(f"running {tests} under coverage", flush=True)
+    command = [sys.executable, "-m", "tools.mutants", "--measure", tests]
+    if subprocess.run(command, check=False).returncode:
+        raise SystemExit(f"{tests}: the tests fail as they are; mend them first")
 
 
 def _rank(seed: int, mutant: operators.Mutant) -> bytes:
@@ -211,9 +233,8 @@ def main() -> int:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     if args.measure:
         rooms = [Path.cwd() / "dmpcli" / room for room in ROOMS]
-        kept = OUT / "reach" / (args.measure.replace("/", "-") + ".json")
-        return reach.measure(args.measure, rooms, kept)
-    known = measured(args.tests or [f"tests/{room}" for room in ROOMS], args.reach)
+        return reach.measure(args.measure, rooms, _kept(args.measure))
+    known = measured(args.tests or [f"tests/{room}" for room in ROOMS + OTHERS], args.reach)
     seed = random.SystemRandom().randrange(10**6) if args.seed is None else args.seed
     if args.again:
         mutants, kept = listed(args.again), OUT / f"again-{os.getpid()}.jsonl"
