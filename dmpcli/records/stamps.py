@@ -44,8 +44,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
     """
     if nanoseconds is not None:
         t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
-        t -= t[0]
-        return t
+        return t - t[0]
     values: Any = table.columns.get(column)
     if isinstance(values, pa.Array | pa.ChunkedArray):
         dates = _dates(values)
@@ -56,7 +55,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
             return exact
     t = table.numbers(column) * TIME[unit]
     if len(t) and abs(t[0]) > EPOCH:
-        t -= t[0]
+        t = t - t[0]
     return t
 
 
