@@ -70,7 +70,8 @@ UR = Extra(
 DASK = Extra("dask", ("dask", "distributed", "threadpoolctl"), "`generalize --cluster`")
 SVG = Extra("svg", ("svgelements",), "`import` of SVG drawings")
 ROS = Extra("ros", ("rosbags", "mcap"), "MCAP files and ROS 2 bags")
-EXTRAS = (UR, DASK, SVG, ROS)
+VIEW = Extra("view", ("k3d",), "`report --view`, a part that can be turned")
+EXTRAS = (UR, DASK, SVG, ROS, VIEW)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",

@@ -7,7 +7,13 @@ import pytest
 
 from dmpcli import extras
 
-MODULES = {"ur": "rtde_receive", "dask": "distributed", "svg": "svgelements", "ros": "rosbags"}
+MODULES = {
+    "ur": "rtde_receive",
+    "dask": "distributed",
+    "svg": "svgelements",
+    "ros": "rosbags",
+    "view": "k3d",
+}
 
 
 def needs(extra: extras.Extra) -> pytest.MarkDecorator:

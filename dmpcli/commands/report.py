@@ -33,9 +33,25 @@ def command(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="DIR", help="Also write report.json, CSV and figures here."
+            "-o",
+            "--output",
+            metavar="DIR",
+            help="Also write report.html, report.json, CSV and figures here.",
         ),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="With -o: write view.html too, a part to be turned.")
+    ] = False,
+    show: Annotated[
+        bool, typer.Option("--open", help="With -o: show the page, or with --view the part.")
+    ] = False,
+    png: Annotated[
+        bool, typer.Option("--png", help="With -o: write the figures as PNG too, beside the SVG.")
+    ] = False,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="The paper's tables beside ours, and with -o its figures."),
+    ] = False,
     form: RecordingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
@@ -52,12 +68,20 @@ def command(
         raise InputError("-: standard input can be read only once; name the other files")
     surface_input.check_options(surface, surface_pose, surface_unit)
     check_output(output)
+    if output is None and (view or show):
+        raise InputError("--view and --open need the folder of the pages: give -o DIR")
+    if view:
+        from dmpcli.reporting.turnable import check
+
+        check()
     layout = form.as_layout()
     read = None
     if surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output)
+    made = report(files, None, layout, read, output, paper, view, png)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
+    if show and output is not None:
+        typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))
 
 
 def _width() -> int:

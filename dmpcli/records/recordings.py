@@ -63,12 +63,15 @@ class Recording:
         What is likely wrong with it, with the remedy.
     ours : bool
         Whether it is a file of this program's, which tells its units and angles.
+    began : float or None
+        What the file's clock shows at time 0, s; None where it shows dates, or there is none.
     """
 
     stroke: Trajectory
     told: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     ours: bool = False
+    began: float | None = None
 
 
 @dataclass
@@ -142,7 +145,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
         stroke = Trajectory(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
-        return Recording(stroke, ours=True)
+        return Recording(stroke, ours=True, began=0.0)
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
@@ -159,7 +162,8 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     _check_position(reading.table, stroke.position)
     _doubt_units(reading, stroke)
     reading.doubts += rotation_forms.unread(reading.names, reading.taken)
-    return Recording(stroke, tuple(reading.told), tuple(reading.doubts))
+    began = _began(reading, name, float(t[0]))
+    return Recording(stroke, tuple(reading.told), tuple(reading.doubts), began=began)
 
 
 def stroke(source: Source, layout: Layout | None = None) -> Trajectory:
@@ -249,6 +253,18 @@ def _time(reading: _Reading) -> tuple[Floats, str]:
         return _ros_time(reading, column), column.name
     unit = reading.unit(column, "time", TIME)
     return stamps.seconds(table, column.name, unit, within.name if within else None), column.name
+
+
+def _began(reading: _Reading, name: str, first: float) -> float | None:
+    """Return what the clock of a table showed at time 0, s; None without one of numbers."""
+    column = reading.find("t")
+    if reading.layout.sample_rate is not None or column is None:
+        return None
+    began = stamps.clock(reading.table, name, reading.units["time"], first)
+    within = reading.find(NANOSECONDS)
+    if began is None or within is None:
+        return began
+    return began + float(reading.table.numbers(within.name)[0]) * 1e-9
 
 
 def _ros_time(reading: _Reading, column: LayoutColumn) -> Floats:

@@ -4,11 +4,17 @@ from dmpcli.messages import tell, warn
 from dmpcli.records import recordings
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
+from dmpcli.records.recordings import Recording
 from dmpcli.spatial.trajectory import Trajectory
 
 
 def recording(source: Source, layout: Layout | None) -> Trajectory:
     """Read a recording, and say how it was read and what is doubtful about it."""
+    return read(source, layout).stroke
+
+
+def read(source: Source, layout: Layout | None) -> Recording:
+    """Read a recording likewise, with what its file says of its clock."""
     found = recordings.read(source, layout)
     if found.ours and layout is not None:
         tell(
@@ -18,4 +24,4 @@ def recording(source: Source, layout: Layout | None) -> Trajectory:
         tell(f"{source.name}: {remark}")
     for doubt in found.doubts:
         warn(f"{source.name}: {doubt}")
-    return found.stroke
+    return found
