@@ -22,20 +22,10 @@ WIDTHS = (390, 1400)
 HEIGHT = 900
 PATIENCE = 120.0
 FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--mute-audio",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-default-apps",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--remote-debugging-pipe",
-    "--hide-scrollbars",
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--disable-default-apps", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    *("--remote-debugging-pipe", "--hide-scrollbars", "--mute-audio"),
 ]
 
 
@@ -130,6 +120,7 @@ def look(browser: Browser, page: Path, width: int, picture: Path) -> list[str]:
     end = time.monotonic() + PATIENCE
     while not value(done):
         if time.monotonic() > end:
+            value("0")  # so that what was told meanwhile is read
             return [f"{page.name} at {width}: not drawn after {PATIENCE:g} s", *wrong(browser)]
         time.sleep(0.1)
     value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")

@@ -23,6 +23,7 @@ from dmpcli.arrays import Floats
 from dmpcli.records.record import Record
 from dmpcli.reporting import contact
 from dmpcli.reporting.curve_names import short, speed_of
+from dmpcli.reporting.part_figure import looking
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.style import STYLES
@@ -100,7 +101,7 @@ def page(
     size = float(np.linalg.norm(np.ptp(np.vstack([s.position for s in chosen]), axis=0))) or 1.0
     plot = k3d.plot(
         grid_visible=True, menu_visibility=False, colorbar_object_id=0, axes=["X", "Y", "Z"],
-        camera_auto_fit=True, background_color=0xFFFFFF, grid_color=0xE0E0E0, name="dmpcli",
+        camera_auto_fit=False, background_color=0xFFFFFF, grid_color=0xE0E0E0, name="dmpcli",
     )  # fmt: skip
     if ground is not None:
         _add_part(k3d, plot, chosen, ground, size)
@@ -108,6 +109,7 @@ def page(
     groups = [_add_strokes(k3d, plot, chosen, one, size, i == 0) for i, one in enumerate(found)]
     _add_ends(k3d, plot, chosen, size)
     last = _add_tool(k3d, plot, chosen, size)
+    plot.camera = _camera(chosen, size)
     for number, thing in enumerate(plot.objects, start=1):
         thing.id = number
     title = ", ".join(short(stroke.label) for stroke in chosen[:4])
@@ -262,6 +264,18 @@ def _bars(k3d: Any, feet: Floats, ends: Floats, colour: int, width: float, name:
     )  # fmt: skip
 
 
+def _camera(strokes: Sequence[ReportedStroke], size: float) -> list[float]:
+    """Return where the eye is, what it looks at, and what is up: the strokes from their side."""
+    normals = [s.footing.normal.mean(axis=0) for s in strokes if s.footing and s.bound]
+    normals += [s.axes[:, 2] for s in strokes if s.axes is not None and not normals]
+    normal = np.mean(normals, axis=0) if normals else np.array([0.0, 0.0, 1.0])
+    _, up, toward = looking(normal)
+    points = np.vstack([stroke.position for stroke in strokes])
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    eye = middle + 1.3 * max(size, 1e-3) * toward
+    return [float(x) for x in (*eye, *middle, *up)]
+
+
 def _text(content: bytes) -> str:
     return base64.b64encode(content).decode()
 
@@ -334,9 +348,12 @@ output { min-width: 4.5em; font-variant-numeric: tabular-nums; }
 const unpack = text => Uint8Array.from(atob(text), sign => sign.charCodeAt(0));
 const quantities = $quantities;
 (0, eval)(fflate.strFromU8(fflate.unzlibSync(unpack('$source'))));
-require(['k3d'], async lib => {
+const draw = async lib => {
   const place = document.getElementById('part');
-  const view = await new lib.CreateK3DAndLoadBinarySnapshot(unpack('$data'), place);
+  const stored = lib.msgpackDecode(fflate.unzlibSync(unpack('$data')));
+  const view = new lib.K3D(lib.ThreeJsProvider, place, { ...stored.plot, standaloneGUI: true });
+  await view.setSnapshot(stored);
+  view.setCamera(stored.plot.camera);
   const by = document.getElementById('by');
   quantities.forEach((one, i) => by.add(new Option(one.name, i)));
   const digits = value => Number(value.toPrecision(3));
@@ -364,7 +381,9 @@ require(['k3d'], async lib => {
   addEventListener('resize', () => view.resizeHelper && view.resizeHelper());
   await choose();
   document.body.dataset.drawn = 'yes';
-});
+};
+// require.js takes no async function for one.
+require(['k3d'], lib => { draw(lib); });
 </script>
 </body>
 </html>
