@@ -101,10 +101,11 @@ def page(
     size = float(np.linalg.norm(np.ptp(np.vstack([s.position for s in chosen]), axis=0))) or 1.0
     plot = k3d.plot(
         grid_visible=True, menu_visibility=False, colorbar_object_id=0, axes=["X", "Y", "Z"],
-        camera_auto_fit=False, background_color=0xFFFFFF, grid_color=0xE0E0E0, name="dmpcli",
+        camera_auto_fit=False, lighting=1.15, background_color=0xFFFFFF, grid_color=0xE0E0E0, name="dmpcli",
     )  # fmt: skip
     if ground is not None:
         _add_part(k3d, plot, chosen, ground, size)
+    _add_lines(k3d, plot, chosen, size)
     found = quantities(chosen, runs)
     groups = [_add_strokes(k3d, plot, chosen, one, size, i == 0) for i, one in enumerate(found)]
     _add_ends(k3d, plot, chosen, size)
@@ -190,6 +191,17 @@ def _add_part(
     )  # fmt: skip
 
 
+def _add_lines(k3d: Any, plot: Any, strokes: Sequence[ReportedStroke], size: float) -> None:
+    """Add all strokes as thin lines, which show where nothing is known to colour them by."""
+    points = np.vstack([stroke.position for stroke in strokes])
+    begins = np.cumsum([0, *(len(stroke.t) for stroke in strokes)])
+    first = np.setdiff1d(np.arange(len(points)), begins[1:] - 1)
+    plot += k3d.lines(
+        points.astype(np.float32), np.column_stack([first, first + 1]).astype(np.uint32),
+        indices_type="segment", color=_AXIS, width=0.004 * size, shader="thick", name="strokes",
+    )  # fmt: skip
+
+
 def _add_strokes(
     k3d: Any, plot: Any, strokes: Sequence[ReportedStroke], one: Quantity, size: float, first: bool
 ) -> Any:
@@ -222,11 +234,23 @@ def _add_ends(k3d: Any, plot: Any, strokes: Sequence[ReportedStroke], size: floa
             np.array(ends, dtype=np.float32), point_size=0.03 * size, color=colour, shader="3d",
             name=name,
         )  # fmt: skip
-    for stroke in strokes[:: max(1, -(-len(strokes) // MOST_IDS))]:
+    for at, name in _labels(strokes):
         plot += k3d.text(
-            escape(_name(stroke)), position=stroke.start.tolist(), color=0x000000, size=0.7,
-            reference_point="lb", label_box=True, is_html=True, name=stroke.label,
+            escape(name), position=at, color=0x000000, size=0.7, reference_point="lb",
+            label_box=True, is_html=True, name=name,
         )  # fmt: skip
+
+
+def _labels(strokes: Sequence[ReportedStroke]) -> list[tuple[list[float], str]]:
+    """Where names stand, and those of all strokes that begin there."""
+    found: list[tuple[Floats, list[str]]] = []
+    for stroke in strokes[:: max(1, -(-len(strokes) // MOST_IDS))]:
+        names = next((n for at, n in found if np.linalg.norm(at - stroke.start) < 1.0), None)
+        if names is None:
+            found.append((stroke.start, [_name(stroke)]))
+        else:
+            names.append(_name(stroke))
+    return [(at.tolist(), ", ".join(names)) for at, names in found]
 
 
 def _name(stroke: ReportedStroke) -> str:
@@ -247,7 +271,7 @@ def _add_tool(k3d: Any, plot: Any, strokes: Sequence[ReportedStroke], size: floa
     tips: dict[str, Floats] = {}
     for t in np.linspace(0.0, last, STEPS):
         tips[f"{t:.6g}"] = np.array([_at(s, t) for s in strokes], dtype=np.float32)
-    plot += k3d.points(tips, point_size=0.035 * size, color=_TIP, shader="3d", name="tool")
+    plot += k3d.points(tips, point_size=0.022 * size, color=_TIP, shader="3d", name="tool")
     return last
 
 
@@ -353,7 +377,9 @@ const draw = async lib => {
   const stored = lib.msgpackDecode(fflate.unzlibSync(unpack('$data')));
   const view = new lib.K3D(lib.ThreeJsProvider, place, { ...stored.plot, standaloneGUI: true });
   await view.setSnapshot(stored);
-  view.setCamera(stored.plot.camera);
+  const eye = stored.plot.camera;
+  const farther = Math.max(1, Math.min(2, place.clientHeight / place.clientWidth));
+  view.setCamera(eye.map((x, i) => i < 3 ? eye[i + 3] + farther * (x - eye[i + 3]) : x));
   const by = document.getElementById('by');
   quantities.forEach((one, i) => by.add(new Option(one.name, i)));
   const digits = value => Number(value.toPrecision(3));
