@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from dmpcli.records import json_files
 from dmpcli.records.json_files import JsonPart
 
 SCHEMA, VERSION = "report", 1
@@ -231,5 +232,4 @@ class Report(JsonPart):
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of ``report.json``."""
-    made = Report.model_json_schema(by_alias=True)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+    return json_files.json_schema(Report, SCHEMA)

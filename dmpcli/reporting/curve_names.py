@@ -20,7 +20,12 @@ SAME = 0.02
 the same motion begun sooner or later, s."""
 
 _COLOURS = ("#E69F00", "#CC79A7", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#9A4F96", "#6A5D2E")
-_LINES = ("-", (0, (5.0, 1.5)), (0, (3.0, 1.0, 1.0, 1.0)), (0, (1.0, 1.0)))
+_LINES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
+    "-",
+    (0, (5.0, 1.5)),
+    (0, (3.0, 1.0, 1.0, 1.0)),
+    (0, (1.0, 1.0)),
+)
 _SHARES = np.linspace(0.25, 0.75, 21)
 
 

@@ -256,7 +256,7 @@ def _scene(
     for text, point in ids:
         at = camera.seen(point[None])[0]
         axes.annotate(
-            text, at[:2], (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
+            text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
             bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
         )  # fmt: skip
     _axes_of(axes, camera)
@@ -280,19 +280,19 @@ def _axes_of(axes: Axes, camera: Camera) -> None:
     """Draw the directions of base X, Y and Z, and a bar of a round length."""
     width = float(camera.size[0])
     arm = 0.055 * width
-    origin = np.array([0.085 * width, 0.085 * width])
+    foot = 0.085 * width
     for name, along in zip("XYZ", np.eye(3), strict=True):
-        way = np.array([along @ camera.right, along @ camera.up])
-        if np.hypot(*way) < 0.15:
+        x, y = float(along @ camera.right), float(along @ camera.up)
+        if np.hypot(x, y) < 0.15:
             continue
-        tip = origin + arm * way
         axes.annotate(
-            "", tip, origin, zorder=50,
+            "", (foot + arm * x, foot + arm * y), (foot, foot), zorder=50,
             arrowprops={"arrowstyle": "-|>", "color": "#333333", "lw": 0.9, "mutation_scale": 7.0},
         )  # fmt: skip
         axes.text(
-            *(origin + 1.32 * arm * way), name, fontsize=7.0, ha="center", va="center", zorder=50
-        )
+            foot + 1.32 * arm * x, foot + 1.32 * arm * y, name, fontsize=7.0, ha="center",
+            va="center", zorder=50,
+        )  # fmt: skip
     bar = round_length(0.22 * width)
     right, low = 0.96 * width, 0.035 * width
     axes.plot([right - bar, right], [low, low], color="#333333", lw=2.0, zorder=50)
@@ -317,8 +317,9 @@ def _inset(
     axes = drawing.panel(figure, left, bottom + tall - height - 0.05, width, height)
     axes.set_facecolor("white")
     _image(axes, rendered(corners, whole), whole)
-    low = camera.low - whole.low
-    axes.add_patch(Rectangle(low, *camera.size, fill=False, ec="#D55E00", lw=1.2, zorder=60))
+    x, y = (camera.low - whole.low).tolist()
+    wide, high = camera.size.tolist()
+    axes.add_patch(Rectangle((x, y), wide, high, fill=False, ec="#D55E00", lw=1.2, zorder=60))
 
 
 def runs(marks: Booleans) -> list[slice]:

@@ -144,7 +144,7 @@ def _outline(axes: Axes, edges: Floats) -> None:
 
 def _write(axes: Axes, text: str, at: Floats) -> None:
     axes.annotate(
-        text, at[:2], (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
+        text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
         bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
     )  # fmt: skip
 

@@ -53,7 +53,7 @@ def _on_what(report: Mapping[str, Any]) -> str:
 
 
 def _stroke(row: Row, reference: str | None) -> str:
-    what = _WHAT.get(row["role"], row["role"])
+    what = _WHAT.get(row["role"], str(row["role"]))
     if row["simulated"]:
         what += ", in simulation"
     gap = sum((a - b) ** 2 for a, b in zip(row["start"], row["goal"], strict=True)) ** 0.5

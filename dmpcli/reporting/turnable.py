@@ -101,7 +101,8 @@ def page(
     size = float(np.linalg.norm(np.ptp(np.vstack([s.position for s in chosen]), axis=0))) or 1.0
     plot = k3d.plot(
         grid_visible=True, menu_visibility=False, colorbar_object_id=0, axes=["X", "Y", "Z"],
-        camera_auto_fit=False, lighting=1.15, background_color=0xFFFFFF, grid_color=0xE0E0E0, name="dmpcli",
+        camera_auto_fit=False, lighting=1.15, background_color=0xFFFFFF,
+        grid_color=0xE0E0E0, name="dmpcli",
     )  # fmt: skip
     if ground is not None:
         _add_part(k3d, plot, chosen, ground, size)

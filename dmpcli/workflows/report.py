@@ -139,7 +139,9 @@ def report(
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = MeasurementContext(reference_of(parts), ground, normal)
-        parts = _compared(_measured(parts, sight, tables))
+        parts = _measured(parts, sight, tables)
+        if not paper:
+            parts = _compared(parts)
         made = document.document(parts, said, paper)
         for line in document.warnings(made):
             warn(line)
@@ -172,8 +174,7 @@ def _part(
         )
         if found is not None:
             recorded.origin = found.provenance
-        origin = None if found is None else found.provenance
-        return DocumentPart(label, source.sha256, kind, recorded=recorded, origin=origin)
+        return DocumentPart(label, source.sha256, kind, recorded=recorded, origin=recorded.origin)
     run = found if found.schema is schemas.RUN else None
     states = None if run is None else states_of(run)
     with about(source.name):
