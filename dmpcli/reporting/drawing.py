@@ -124,6 +124,23 @@ def letter(axes: Axes, text: str) -> None:
     axes.set_title(f"({text})", loc="left", fontsize=8.0, pad=4.0)
 
 
+def title(axes: Axes, text: str) -> None:
+    """Write what a panel shows above its upper left corner."""
+    # At a height of our own: to find one, matplotlib would lay out every tick.
+    axes.set_title(text, loc="left", fontsize=8.0, y=1.0, pad=4.0)
+
+
+def labels(axes: Axes, x: str = "", y: str = "") -> None:
+    """Write what the axes of a panel are, at places of our own for the same reason."""
+    width, height = axes.get_position().size * axes.figure.get_size_inches()
+    if x:
+        axes.set_xlabel(x)
+        axes.xaxis.set_label_coords(0.5, -0.26 / height)
+    if y:
+        axes.set_ylabel(y)
+        axes.yaxis.set_label_coords(-0.56 / width, 0.5)
+
+
 def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle) -> None:
     """Draw one line in its role's style."""
     axes.plot(

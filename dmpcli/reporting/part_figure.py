@@ -89,7 +89,7 @@ def part_figure(
     if whole is not None:
         _inset(figure, foot + under, tall, whole, camera, corners)
     note = "; pale: behind or inside the part" if hidden else ""
-    scene.set_title(f"(a)  on the surface, to scale{note}", loc="left", fontsize=8.0)
+    drawing.title(scene, f"(a)  on the surface, to scale{note}")
     for i, draw in enumerate(panels):
         bottom = foot + (len(panels) - 1 - i) * (_PANEL + _GAP)
         axes = drawing.panel(figure, _LEFT, bottom, _WIDTH, _PANEL)
@@ -97,8 +97,7 @@ def part_figure(
         axes.set_xlim(0.0, max(float(_way(one.stroke)[-1]) for one in placed))
         axes.tick_params(labelbottom=i == len(panels) - 1)
         if i == len(panels) - 1:
-            axes.set_xlabel("along the stroke / mm")
-    figure.align_ylabels()
+            drawing.labels(axes, x="along the stroke / mm")
     drawing.legend(figure, key, columns, more)
     return figure
 
@@ -130,11 +129,8 @@ def _height(axes: Axes, placed: Sequence[PlacedCurve]) -> None:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * span, middle + 0.5 * span)
     axes.axhline(0.0, color="#666666", lw=0.8, zorder=1)
-    axes.set_ylabel("off the surface\n/ mm")
-    axes.set_title(
-        f"(b)  distance to the nearest point of the surface, below 0 inside{said}",
-        loc="left", fontsize=8.0,
-    )  # fmt: skip
+    drawing.labels(axes, y="off the surface\n/ mm")
+    drawing.title(axes, f"(b)  distance to the nearest point of the surface, below 0 inside{said}")
 
 
 def _tilt(axes: Axes, placed: Sequence[PlacedCurve]) -> None:
@@ -147,8 +143,8 @@ def _tilt(axes: Axes, placed: Sequence[PlacedCurve]) -> None:
         lines.append(np.degrees(one.stroke.footing.tilt))
     _lines(axes, leaning, lines)
     axes.set_ylim(0.0, max(1.1 * max(float(line.max()) for line in lines), LEAST_TILT))
-    axes.set_ylabel("tool off the\nnormal / °")
-    axes.set_title("(c)  angle between the tool and the surface's normal", loc="left", fontsize=8.0)
+    drawing.labels(axes, y="tool off the\nnormal / °")
+    drawing.title(axes, "(c)  angle between the tool and the surface's normal")
 
 
 def _lines(axes: Axes, placed: Sequence[PlacedCurve], lines: Sequence[Floats]) -> None:
@@ -256,8 +252,9 @@ def _scene(
     for text, point in ids:
         at = camera.seen(point[None])[0]
         axes.annotate(
-            text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
+            text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0,
             bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
+            zorder=41,
         )  # fmt: skip
     _axes_of(axes, camera)
     return any_hidden

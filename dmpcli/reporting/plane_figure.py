@@ -115,16 +115,15 @@ def plane_figure(
     edge.set_ylim(0.5 * (z0 + z1) - 0.5 * span, 0.5 * (z0 + z1) + 0.5 * span)
     edge.locator_params(axis="y", nbins=4)
     top.tick_params(labelbottom=False)
-    top.set_ylabel(names[1])
-    edge.set_ylabel(names[2])
-    edge.set_xlabel(names[0])
-    top.set_title(f"(a)  {beyond.seen}, to scale", loc="left", fontsize=8.0)
+    drawing.labels(top, y=names[1])
+    drawing.labels(edge, y=names[2])
+    drawing.labels(edge, x=names[0])
+    drawing.title(top, f"(a)  {beyond.seen}, to scale")
     larger = (x_limits[1] - x_limits[0]) / width / (span / _EDGE)
     said = f", heights drawn {rounded(larger)} times as large" if larger > 1.5 else ""
-    edge.set_title(f"(b)  from the side{said}", loc="left", fontsize=8.0)
+    drawing.title(edge, f"(b)  from the side{said}")
     if beyond.elsewhere:
         _map(drawing.panel(figure, _LEFT, foot, _WIDE, _MAP), beyond)
-    figure.align_ylabels()
     drawing.legend(figure, key, columns, more)
     return figure
 
@@ -144,8 +143,8 @@ def _outline(axes: Axes, edges: Floats) -> None:
 
 def _write(axes: Axes, text: str, at: Floats) -> None:
     axes.annotate(
-        text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0, zorder=41,
-        bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
+        text, (float(at[0]), float(at[1])), (5, 4), textcoords="offset points", fontsize=7.0,
+        bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7}, zorder=41,
     )  # fmt: skip
 
 
@@ -159,10 +158,10 @@ def _map(axes: Axes, beyond: Beyond) -> None:
     _write(axes, "(a)", beyond.here[0][0])
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
-    axes.set_xlabel("X / mm")
-    axes.set_ylabel("Y / mm")
+    drawing.labels(axes, x="X / mm")
+    drawing.labels(axes, y="Y / mm")
     title = "(c)  where that is, seen from above the robot's base"
-    axes.set_title(title, loc="left", fontsize=8.0)
+    drawing.title(axes, title)
 
 
 def rounded(value: float) -> str:

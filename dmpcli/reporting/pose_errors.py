@@ -169,17 +169,16 @@ def figure(pair: Compared) -> Figure:
         bottom = foot + (len(parts) - 1 - i) * (_PANEL + _GAP)
         axes = drawing.panel(made, _LEFT, bottom, _WIDTH, _PANEL)
         _panel(axes, pair, name, factor)
-        axes.set_ylabel(unit)
-        axes.set_title(f"({'ab'[i]})  {name}", loc="left", fontsize=8.0)
+        drawing.labels(axes, y=unit)
+        drawing.title(axes, f"({'ab'[i]})  {name}")
         axes.tick_params(labelbottom=i == len(parts) - 1)
-    axes.set_xlabel("t / s")
+    drawing.labels(axes, x="t / s")
     key = [
         (Line2D([], [], color=_AS_IS, lw=1.3), "as it is"),
         (Line2D([], [], color=_ALIGNED, lw=1.3, ls="--"), "after alignment"),
         (Line2D([], [], color=_AS_IS, lw=0.8, ls=":"), "root mean square as it is"),
         (Line2D([], [], color=_ALIGNED, lw=0.8, ls=":"), "root mean square after alignment"),
     ]
-    made.align_ylabels()
     made.legend([line for line, _ in key], [text for _, text in key], loc="lower center", ncols=2)
     return made
 

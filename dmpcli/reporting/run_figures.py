@@ -55,13 +55,13 @@ def force_figure(run: Record, row: dict[str, float] | None) -> Figure | None:
         if meant is not None:
             axes.axhline(meant, color=_LINE, lw=1.0, ls="-.")
         axes.set_ylim(min(0.0, 1.1 * float(np.nanmin(normal))), 1.15 * largest)
-        axes.set_ylabel("force / N")
+        drawing.labels(axes, y="force / N")
     over_time.set_xlim(float(run.t[0]), float(run.t[-1]))
     along.set_xlim(0.0, float(way[-1]) or 1.0)
-    over_time.set_title("(a)  over time", loc="left", fontsize=8.0)
-    over_time.set_xlabel("t / s")
-    along.set_title("(b)  along the drawn path", loc="left", fontsize=8.0)
-    along.set_xlabel("path / mm")
+    drawing.title(over_time, "(a)  over time")
+    drawing.labels(over_time, x="t / s")
+    drawing.title(along, "(b)  along the drawn path")
+    drawing.labels(along, x="path / mm")
     _key(figure, key)
     return figure
 
@@ -87,10 +87,9 @@ def deadline_figure(run: Record) -> Figure:
         _over_time(axes, deadline, values, drawn)
         axes.set_xlim(float(deadline[0]), float(deadline[-1]) or 1.0)
         axes.set_ylim(0.0, 1.15 * float(np.nanmax(values)) or 1.0)
-        axes.set_ylabel(name)
-        axes.set_title(title, loc="left", fontsize=8.0)
-        axes.set_xlabel("t / s")
-    figure.align_ylabels()
+        drawing.labels(axes, y=name)
+        drawing.title(axes, title)
+        drawing.labels(axes, x="t / s")
     _key(figure, key)
     return figure
 

@@ -43,11 +43,12 @@ def time_figure(curves: Sequence[PlottedCurve]) -> Figure:
                 t = curve.marks_t - curve.shift
                 drawing.mark(axes, t, curve.marks[:, i], curve.style)
         axes.set_xlim(low, high)
-        drawing.letter(axes, "abcde"[i])
+        drawing.title(axes, f"({'abcde'[i]})")
         axes.tick_params(labelbottom=i == len(rows) - 1)
         if i == len(rows) - 1:
-            axes.set_xlabel("t / s of the first; the others moved, see below" if moved else "t / s")
-    figure.align_ylabels()
+            drawing.labels(
+                axes, x="t / s of the first; the others moved, see below" if moved else "t / s"
+            )
     drawing.legend(figure, [_moved(curve) for curve in curves], columns)
     return figure
 
@@ -79,11 +80,11 @@ def _row(axes: Axes, name: str, curves: Sequence[PlottedCurve]) -> None:
     every = np.concatenate(shown)
     if name == "speed":
         axes.set_ylim(0.0, 1.1 * float(every.max()) or 1.0)
-        axes.set_ylabel("speed / mm/s")
+        drawing.labels(axes, y="speed / mm/s")
     elif name == "turn":
         axes.set_ylim(0.0, max(1.1 * float(every.max()), _LEAST_TURN))
-        axes.set_ylabel("tool turned / °")
+        drawing.labels(axes, y="tool turned / °")
     else:
         axes.set_ylim(drawing.spanned(float(every.min()), float(every.max())))
-        axes.set_ylabel(f"{name} / mm")
+        drawing.labels(axes, y=f"{name} / mm")
     axes.locator_params(axis="y", nbins=5)
