@@ -1,12 +1,16 @@
 # dmpcli: set-up, tests, the demonstration and the paper's experiments.
 #
+#   make setup       the environment .venv, from pinned versions
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
+#   make reproduce-force  force on surfaces that are not where the plan has them, in physics
 #   make test        tests, lint, types and import rules
 #   make test-quick  the quick half of the tests
 #   make lint        ruff, mypy and import-linter
 #   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
+#   make docs        the pages as a site, in out/docs/site; a warning is an error
+#   make reference   docs/reference, from the program
 #   make dist        sdist and wheel, checked, and the wheel tried in an environment without extras
 #   make lock        the lock files, from pyproject.toml
 #   make bench       the timings that the README quotes
@@ -15,7 +19,8 @@
 #   make pages       a report's pages in a headless browser: photographs in out/pages
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
-#   make mutations   damaged and crafted inputs for every reader: what is not refused
+#   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
+#   make mutants     small faults in the mathematics and the loops: which no test would notice
 #   make cluster-demo  a batch on two Dask workers, one of which is killed
 #
 # Each sets up what it needs in .venv first. Choose by name: PYTHON=python3.12, VENV=DIR, OUT=DIR.
@@ -41,8 +46,8 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo reproduce test test-quick coverage test-lowest lint lock dist bench peers judges pages faults \
-    soak mutations cluster-demo samples pictures schemas clean FORCE
+.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick coverage test-lowest lint lock dist bench peers \
+    judges pages faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -52,6 +57,8 @@ help:
 
 $(VENV)/installed: FORCE
 	@sh tools/set_up.sh "$(PYTHON)" "$(VENV)" "$(LOCK)" "$(OUT)"
+
+setup: $(VENV)/installed
 
 # Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
 # what they share is made once. Lint and types are looked at meanwhile: some tests wait in real time,
@@ -93,6 +100,7 @@ lock:
 	$(UV) pyproject.toml --extra test -o requirements.lock $(UPGRADE)
 	$(UV) pyproject.toml --extra test -o requirements-lowest.lock --resolution lowest-direct --upgrade
 	$(UV) --group dist -o requirements-dist.lock $(UPGRADE)
+	$(UV) --group docs -o requirements-docs.lock $(UPGRADE)
 
 # What is handed out: built from one another, checked, and the wheel tried without extras.
 
@@ -105,6 +113,19 @@ dist:
 	$(DIST)/tools/bin/python -m check_wheel_contents $(DIST)/files/*.whl
 	$(DIST)/tools/bin/python tools/check_wheel.py $(DIST)/files/*.whl $(DIST)/bare requirements.lock
 
+# The site. Its pages need nothing of the program: what is made from it stands in docs/reference.
+
+SITE := $(OUT)/docs
+
+docs:
+	@sh tools/set_up.sh "$(PYTHON)" "$(SITE)/tools" requirements-docs.lock "$(OUT)" bare
+	rm -rf $(SITE)/site
+	$(SITE)/tools/bin/python -m sphinx -W --keep-going -q -b html -d $(SITE)/cache docs $(SITE)/site
+	@printf 'Look at file://%s\n' "$(abspath $(SITE))/site/index.html"
+
+reference: $(VENV)/installed
+	$(BIN)/python -m tools.reference
+
 bench: export OPENBLAS_NUM_THREADS := 1
 bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.fit
@@ -113,11 +134,13 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.noise
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python -m benchmarks.csv_reading
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
 	$(BIN)/python -m benchmarks.taught_surfaces
 	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
+	$(BIN)/python -m benchmarks.live_view
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
 
 # Programs of others that take long to install judge what export writes, in an environment of their own.
@@ -127,7 +150,8 @@ JUDGES := $(OUT)/judges/venv
 judges:
 	@sh tools/set_up.sh "$(PYTHON)" "$(JUDGES)" "$(LOCK)" "$(OUT)"
 	$(JUDGES)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/judges.txt
-	DMPCLI_JUDGES=required $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
+	@sh tools/linuxcnc.sh $(OUT)/judges/linuxcnc
+	DMPCLI_JUDGES=required DMPCLI_LINUXCNC=$(OUT)/judges/linuxcnc $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
 	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py \
 	    tests/metrics/test_pose_error.py tests/commands/test_report_pose_error.py
 
@@ -162,8 +186,18 @@ faults: $(VENV)/installed
 soak: $(VENV)/installed
 	$(BIN)/python -m benchmarks.soak
 
+# Of each reader; one number replays one: python -m benchmarks.mutations --again READER NUMBER.
+MUTATIONS ?= 2000
+
 mutations: $(VENV)/installed
-	$(BIN)/python -m benchmarks.mutations --keep $(OUT)/mutations
+	$(BIN)/python -m benchmarks.mutations --count $(MUTATIONS) --keep $(OUT)/mutations
+
+# docs/mutants.md; SEED=N draws the same ones again, and goes on where a run was stopped.
+MUTANTS ?= 500
+JOBS    ?= 1
+
+mutants: $(VENV)/installed
+	nice -n 19 $(BIN)/python -m tools.mutants --count $(MUTANTS) --jobs $(JOBS) $(if $(SEED),--seed $(SEED))
 
 # Beside other packages. Where the index at hand has no CPU build of torch, torch's own has.
 
@@ -196,8 +230,8 @@ demo: $(VENV)/installed
 	    -o $(DEMO)/report
 	$(DMPCLI) generalize $(DEMO)/skill.json -o $(DEMO)/batch --pairs sample_runs/pairs.csv
 	$(DMPCLI) report $(DEMO)/demonstration.parquet $(DEMO)/batch -o $(DEMO)/batch-report
-	@$(MAKE) --no-print-directory reproduce
-	@printf '\nFigures: %s\n' "$(DEMO)/report, $(DEMO)/batch-report and $(R)/*/report"
+	@page=$(DEMO)/report/report.html; [ -f "$$page" ] || page=$(DEMO)/report; \
+	    printf '\nLook at file://%s\n' "$(abspath $(DEMO))$${page#$(DEMO)}"
 
 # The paper's flat experiments (section 3.2.1): Tables 1 and 2, Figures 5 to 8; the curved one
 # (section 3.2.2): Figure 9; and the drag comparison of Figures 3 and 4. Twice: from the noise-free
@@ -228,6 +262,15 @@ reproduce: $(REPORTS) $(STROKES:%=$(R)/%/tables.txt) $(R)/drag/report/report.jso
 	done
 	@printf '\n== Admittance drag and built-in drag (Figures 3 and 4) ==\n'
 	@cat $(R)/drag/tables.txt
+
+# Needs dmpcli[bench], which the environment of the tests has; SEEDS=5.
+
+SEEDS ?= 5
+
+reproduce-force: export OPENBLAS_NUM_THREADS := 1
+reproduce-force: $(VENV)/installed
+	@mkdir -p $(R)
+	$(BIN)/python -m benchmarks.force surfaces --seeds $(SEEDS) | tee $(R)/force.md
 
 define FIT_RULES
 $(R)/$(1)/$(2).json: sample_runs/$(1).parquet | $(VENV)/installed

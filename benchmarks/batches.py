@@ -29,7 +29,7 @@ from benchmarks.cluster_demo import BIN, cluster
 from benchmarks.surfaces import FACES
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
-from dmpcli.batch.part import Task
+from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.dmp.generalization import draw_blocks
 from dmpcli.dmp.rollout import Pairs

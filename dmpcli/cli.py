@@ -11,7 +11,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 
+from dmpcli.commands.help_page import HelpedCommand, width
 from dmpcli.commands.pose_arguments import joined
+from dmpcli.commands.shared_options import shared
 from dmpcli.errors import DmpError, UnconfirmedStopError, printable
 from dmpcli.messages import prepare_streams, say
 from dmpcli.version import __version__
@@ -32,6 +34,9 @@ COMMANDS = {
     "simulate": "Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C.",
     "calibrate": "Identify what hangs on the sensor from static poses, with nothing touching the tool.",  # noqa: E501
     "touch": "Lead the tip to a point by pendant or hand; Enter takes it, at rest, and q ends.",
+    "check": "Connect to robot and sensor, read them and tell; nothing moves.",
+    "presets": "Say which presets there are and what they set; or print one.",
+    "info": "Tell versions, extras and machine, as the report of a bug needs them.",
 }
 """Each subcommand in one sentence; its module of `dmpcli.commands` has its name."""
 
@@ -55,8 +60,11 @@ class LazyCommand(TyperCommand):
             pretty_exceptions_enable=False,
             context_settings=CONTEXT,
         )
-        whole.command(self.name)(module.command)
-        return typer.main.get_command(whole).make_context(info_name, args, parent, **extra)
+        name = str(self.name)
+        whole.command(name, cls=HelpedCommand)(shared(module.command, name, [*args]))
+        return typer.main.get_command(whole).make_context(
+            info_name, args, parent, **{"max_content_width": width()} | extra
+        )
 
 
 def _show_defect(error: DmpError) -> None:
@@ -73,7 +81,17 @@ class Group(TyperGroup):
 
     def __init__(self, **said: Any) -> None:
         super().__init__(**said)
-        self.commands = {name: LazyCommand(name, help=text) for name, text in COMMANDS.items()}
+        self.commands = {
+            name: LazyCommand(name, help=text, short_help=text) for name, text in COMMANDS.items()
+        }
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
+    ) -> Any:
+        """Parse the words, with help as wide as the terminal."""
+        return super().make_context(
+            info_name, args, parent, **{"max_content_width": width()} | extra
+        )
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words after the program's name; poses of six words become one value."""

@@ -1,7 +1,8 @@
 """The optional packages: what each extra is for, and where its wheels exist.
 
-The one list of them: the message of a command that misses one, README's table, and the tests that
-are passed over where there is no wheel are made from it; pyproject.toml names the same packages.
+The one list of them: the message of a command that misses one, the table of docs/install.md, and
+the tests that are passed over where there is no wheel are made from it; pyproject.toml names the
+same packages.
 """
 
 import importlib
@@ -70,8 +71,13 @@ UR = Extra(
 DASK = Extra("dask", ("dask", "distributed", "threadpoolctl"), "`generalize --cluster`")
 SVG = Extra("svg", ("svgelements",), "`import` of SVG drawings")
 ROS = Extra("ros", ("rosbags", "mcap"), "MCAP files and ROS 2 bags")
+BENCH = Extra(
+    "bench",
+    ("mujoco",),
+    "`bench://` and `simulate --physics mujoco`, contact with physics",
+)
 VIEW = Extra("view", ("k3d",), "`report --view`, a part that can be turned")
-EXTRAS = (UR, DASK, SVG, ROS, VIEW)
+EXTRAS = (UR, DASK, SVG, ROS, BENCH, VIEW)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",
@@ -127,7 +133,7 @@ def _where(extra: Extra) -> str:
 
 
 def table() -> str:
-    """Return README's table of extras."""
+    """Return the table of extras in docs/install.md."""
     lines = ["| extra | for | installs | wheels |", "| --- | --- | --- | --- |"]
     for extra in EXTRAS:
         packages = ", ".join(extra.packages)

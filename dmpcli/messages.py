@@ -8,10 +8,12 @@ import contextlib
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
-from dmpcli.errors import printable
+from dmpcli.errors import DmpError, InputError, printable
 
 LOG = logging.getLogger("dmpcli")
 
@@ -19,10 +21,55 @@ LOG = logging.getLogger("dmpcli")
 class Terminal(logging.Handler):
     """Writes what is told to standard error; standard output is for data only."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.shown: Callable[[str], None] = say
+
     def emit(self, record: logging.LogRecord) -> None:
         """Write one message; what a person must know carries the program's name."""
         said = record.getMessage()
-        say(said if record.levelno < logging.WARNING else f"dmpcli: {said}")
+        self.shown(said if record.levelno < logging.WARNING else f"dmpcli: {said}")
+
+
+class LogFile(logging.Handler):
+    """Keeps every message with its time; where it cannot, it says so once and goes on.
+
+    Parameters
+    ----------
+    path : Path
+        Appended to.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(logging.INFO)
+        try:
+            self._stream = path.open("a", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--log {path}: cannot be written: {error.strerror}") from None
+        self._path, self._broken = path, False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one message, its lines below one another."""
+        now = datetime.now(UTC).isoformat(timespec="milliseconds").removesuffix("+00:00")
+        text = printable(record.getMessage()).replace("\n", "\n    ")
+        try:
+            self._stream.write(f"{now}Z {record.levelname.lower():7} {text}\n")
+            self._stream.flush()
+        except (OSError, ValueError) as error:
+            if not self._broken:
+                self._broken = True
+                say(f"dmpcli: --log {self._path}: {error}; what follows is not in it")
+
+    def close(self) -> None:
+        """Close the file."""
+        with contextlib.suppress(OSError):
+            self._stream.close()
+        super().close()
 
 
 class Unbreakable:
@@ -75,25 +122,135 @@ def say(text: str) -> None:
 
 def on_terminal(quiet: bool) -> None:
     """Write what is told to standard error from now on; when quiet, only what must be known."""
-    if not any(isinstance(handler, Terminal) for handler in LOG.handlers):
-        LOG.addHandler(Terminal())
+    terminal = _terminal()
+    if terminal is None:
+        terminal = Terminal()
+        LOG.addHandler(terminal)
         LOG.propagate = False
-    LOG.setLevel(logging.WARNING if quiet else logging.INFO)
+    terminal.setLevel(logging.WARNING if quiet else logging.INFO)
+    heard = any(handler.level <= logging.INFO for handler in LOG.handlers)
+    LOG.setLevel(logging.INFO if heard else logging.WARNING)
+
+
+@contextlib.contextmanager
+def logged(path: Path | None, line: str) -> Iterator[None]:
+    """Keep every message in a file too, and how the command began and ended.
+
+    Parameters
+    ----------
+    path : Path or None
+        No file.
+    line : str
+        The command line.
+    """
+    if path is None:
+        yield
+        return
+    file = LogFile(path)
+    LOG.addHandler(file)
+
+    def note(level: int, text: str) -> None:
+        file.handle(logging.LogRecord(LOG.name, level, "", 0, text, None, None))
+
+    note(logging.INFO, line)
+    end = "done"
+    try:
+        yield
+    except DmpError as error:
+        note(logging.ERROR, str(error))
+        end = f"exit code {error.exit_code}"
+        raise
+    except BaseException as error:
+        code = getattr(error, "exit_code", getattr(error, "code", 1))
+        end = f"exit code {code}" if code else "done"
+        if isinstance(error, Exception) and not hasattr(error, "exit_code"):
+            note(logging.ERROR, f"a defect: {type(error).__name__}: {error}")
+        raise
+    finally:
+        note(logging.INFO, end)
+        LOG.removeHandler(file)
+        file.close()
+
+
+@contextlib.contextmanager
+def diverted(shown: Callable[[str], bool]) -> Iterator[None]:
+    """Give what would be written to standard error to something that shows it above a picture.
+
+    Parameters
+    ----------
+    shown : callable
+        Takes a text; False where it could not be shown, and it is written as ever.
+    """
+    terminal = _terminal()
+    if terminal is None:
+        yield
+        return
+
+    def show(text: str) -> None:
+        if not shown(printable(text)):
+            say(text)
+
+    terminal.shown = show
+    try:
+        yield
+    finally:
+        terminal.shown = say
 
 
 def wanted() -> bool:
     """Tell whether what a person may want to know is heard at all."""
-    return LOG.isEnabledFor(logging.INFO)
+    terminal = _terminal()
+    return LOG.isEnabledFor(logging.INFO) and (
+        terminal is None or any(one.level <= logging.INFO for one in LOG.handlers)
+    )
 
 
-def tell(message: str) -> None:
-    """Say what a person may want to know."""
-    LOG.info("%s", message)
+def tell(message: str, facts: Mapping[str, Any] | None = None) -> None:
+    """Say what a person may want to know.
+
+    Parameters
+    ----------
+    message : str
+    facts : mapping, optional
+        The same for a program, as JSON values: what ``--json`` prints beside the message.
+    """
+    LOG.info("%s", message, extra={"facts": dict(facts or {})})
 
 
 def warn(message: str) -> None:
     """Say what a person must know, even with ``--quiet``."""
     LOG.warning("%s", message)
+
+
+class _Heard(logging.Filter):
+    """Keeps what is told instead of letting it through."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.told: list[tuple[int, str]] = []
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Keep a message."""
+        self.told.append((record.levelno, record.getMessage()))
+        return False
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[list[tuple[int, str]]]:
+    """Keep what is told meanwhile, with its level, for somebody else to tell."""
+    kept, level = _Heard(), LOG.level
+    LOG.addFilter(kept)
+    LOG.setLevel(logging.INFO)
+    try:
+        yield kept.told
+    finally:
+        LOG.removeFilter(kept)
+        LOG.setLevel(level)
+
+
+def tell_as(level: int, message: str) -> None:
+    """Say what was heard elsewhere, see `heard`."""
+    LOG.log(level, "%s", message)
 
 
 @contextlib.contextmanager
@@ -105,7 +262,7 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
     callable
         Takes the number of steps done since the last call.
     """
-    if not _watched():
+    if not watched():
         yield lambda _: None
         return
     from rich.console import Console
@@ -123,19 +280,12 @@ def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda steps: bar.advance(task, steps)
 
 
-@contextlib.contextmanager
-def status(text: str) -> Iterator[None]:
-    """Show a line on the command line's terminal while something goes on; elsewhere nothing."""
-    if not _watched():
-        yield
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(text):
-        yield
-
-
-def _watched() -> bool:
+def watched() -> bool:
     """Tell whether a person sits before the command line's terminal, and wants to be told."""
-    ours = any(isinstance(handler, Terminal) for handler in LOG.handlers)
-    return ours and wanted() and sys.stderr.isatty()
+    terminal = _terminal()
+    heard = terminal is not None and terminal.level <= logging.INFO
+    return heard and sys.stderr is not None and sys.stderr.isatty()
+
+
+def _terminal() -> Terminal | None:
+    return next((one for one in LOG.handlers if isinstance(one, Terminal)), None)

@@ -12,6 +12,7 @@ MODULES = {
     "dask": "distributed",
     "svg": "svgelements",
     "ros": "rosbags",
+    "bench": "mujoco",
     "view": "k3d",
 }
 

@@ -1,4 +1,4 @@
-"""Extras: one list, and what README, pyproject.toml, messages and skipped tests say of them."""
+"""Extras: one list, and what install.md, pyproject.toml, messages and skipped tests say of them."""
 
 import re
 import sys
@@ -24,7 +24,7 @@ def names(requirements):
 
 
 def test_readmes_table_is_made_from_the_list():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
     assert extras.table() in readme
 
 

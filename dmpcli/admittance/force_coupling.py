@@ -1,65 +1,16 @@
 """Force coupling along the surface normal: e(X) of eq. (10) and what it adds to a trajectory.
 
 The wrench acts on the tool and the unit normal n points to the tool's side, so that a surface
-pushes with n·F > 0. Where it pushes harder than the set-point, e grows and the tool moves away.
+pushes with n·F > 0. Where it pushes harder than the set-point, e grows and the tool moves away;
+`force_law` has the law that moves e.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.admittance import model as admittance
 from dmpcli.arrays import Floats
 from dmpcli.dmp.transformation_system import TransformationGains, transition
-
-
-@dataclass(frozen=True)
-class CouplingLaw:
-    """The admittance model along the normal, ``M·ë + D·ė + K·e = n·F - F_d``.
-
-    Attributes
-    ----------
-    model : admittance.Law
-        M, D and K of one axis, the normal, and the servo period. With K = 0 the force settles at
-        the set-point.
-    setpoint : float
-        F_d, N, with which the tool shall press.
-    clamp : float
-        Largest |e|, mm.
-    contact : float
-        N; less than this is no contact.
-    patience : float
-        s without contact, once there was one, after which e is released.
-    release : float
-        mm/s at which a released e returns to 0.
-    """
-
-    model: admittance.AdmittanceLaw
-    setpoint: float
-    clamp: float
-    contact: float
-    patience: float
-    release: float
-
-
-@dataclass(frozen=True)
-class Displacement:
-    """State of the admittance model.
-
-    Attributes
-    ----------
-    e, speed : float
-        mm and mm/s along the normal.
-    touched : bool
-        There has been contact.
-    absent : float
-        s since the last contact.
-    """
-
-    e: float = 0.0
-    speed: float = 0.0
-    touched: bool = False
-    absent: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,38 +37,6 @@ class Filter:
     response: Floats
 
 
-def displace(
-    law: CouplingLaw, state: Displacement, force: float, retreat: bool = False
-) -> Displacement:
-    """One step of the admittance model, integrated in the order of eq. (1)-(3).
-
-    Before the first contact e seeks the surface, towards -n, as far as the clamp. When contact is
-    lost for longer than the law's patience, or the plan retreats, e returns to 0 at constant
-    speed: with K = 0 it would otherwise run on. Contact takes the model up again.
-
-    Parameters
-    ----------
-    law : CouplingLaw
-    state : Displacement
-    force : float
-        n·F, N.
-    retreat : bool
-        The plan leaves the surface faster than the model could follow.
-    """
-    period = law.model.period
-    touching = force > law.contact
-    touched = state.touched or touching
-    absent = 0.0 if touching else state.absent + period
-    if not touching and (retreat or (touched and absent > law.patience)):
-        back = law.release * period
-        return Displacement(state.e - min(max(state.e, -back), back), 0.0, touched, absent)
-    excess, speed, e = np.array([[force - law.setpoint], [state.speed], [state.e]])
-    speed, e = admittance.advance(law.model, excess, speed, e)  # e(X) of eq. (10)
-    if abs(e[0]) > law.clamp:
-        return Displacement(float(np.copysign(law.clamp, e[0])), 0.0, touched, absent)
-    return Displacement(float(e[0]), float(speed[0]), touched, absent)
-
-
 def discretize(k: float, d: float, tau: float, alpha_e: float, period: float) -> Filter:
     """Return the filter of eq. (10) with its exact update over one period, e held in between.
 
@@ -134,13 +53,14 @@ def discretize(k: float, d: float, tau: float, alpha_e: float, period: float) ->
     return Filter(k, d, tau, alpha_e, E, inverse @ (E - np.eye(2)) @ np.array([alpha_e / tau, 0.0]))
 
 
-def fast_filter(tau: float, period: float, periods: float = 2.0) -> Filter:
+def fast_filter(tau: float, period: float, periods: float = 0.5) -> Filter:
     """Return the filter that `execute` takes on the normal axis.
 
     The stroke's own gains answer within about 2·tau/d, half a second for a stroke of ten: too slow
     to hold a force. A plain trajectory solves the equations for any k and d, with another forcing
     term, so on this one axis they are chosen anew: critically damped (k = d²/4) with a time
-    constant 2·tau/d of two servo periods, and unit gain at rest, alpha_e = k/d.
+    constant 2·tau/d of half a servo period, and unit gain at rest, alpha_e = k/d: what it delays
+    the loop can hold the less force by.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from one machine, whatever the number of workers and whichever dies on the way. 
 the same programs and must see the batch's folder under the same path.
 """
 
+import contextlib
 import platform
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -29,8 +30,9 @@ _AHEAD = 2
 _PLUGIN = "dmpcli-"
 
 
-def workers(address: str) -> Draw:
-    """Return what draws parts on a cluster.
+@contextlib.contextmanager
+def workers(address: str) -> Iterator[Draw]:
+    """Lend what draws parts on a cluster.
 
     Parameters
     ----------
@@ -54,10 +56,10 @@ def workers(address: str) -> Draw:
         ) from None
 
     def draw(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
-        with client:
-            yield from _drawn(client, address, job, parts)
+        yield from _drawn(client, address, job, parts)
 
-    return draw
+    with client:
+        yield draw
 
 
 def versions() -> dict[str, str]:

@@ -6,19 +6,22 @@ with the same inputs and options goes on from them: each part's metadata say wha
 
 import contextlib
 import json
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dmpcli.batch.part import FACT, Job, Outcome, file_of
+from dmpcli.batch.ledger import Ledger
+from dmpcli.batch.part import FACT, Job, Outcome, outcome_of
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, record, schemas
 from dmpcli.records.record import Record
 
-_TEMPORARY = f".{file_io.PART}.*.tmp"
+_TEMPORARY = ".part-*.parquet.*.tmp"
 
 
 class Folder:
@@ -28,52 +31,107 @@ class Folder:
     ----------
     job : Job
         Its folder need not exist yet.
+    share : str
+        Of the batch, that this run draws; its ledger has this name.
     """
 
-    def __init__(self, job: Job) -> None:
-        self.path = Path(job.folder)
-        self._expected = json.loads(record.header(Record(schemas.TRAJECTORY, {}, job.provenance)))
+    def __init__(self, job: Job, share: str = "1-of-1") -> None:
+        self.job, self.path = job, Path(job.folder)
+        columns = {schemas.EVENT: np.empty(0, dtype=object)} if job.task.events else {}
+        empty = Record(schemas.TRAJECTORY, columns, job.provenance)
+        self._expected = json.loads(record.header(empty))
+        self._own = () if job.prepare is None else tuple(job.provenance.facts)
+        self._ledger = Ledger(self.path, self._expected, share)
+        self._whole = True
+        self._there: dict[str, os.stat_result] = {}
+        self._told: dict[str, Outcome] = {}
+        self._stale: set[str] = set()
+        self._table: tuple[Path, BinaryIO, record.GrowingRecord] | None = None
 
-    def open(self, numbers: Iterable[int], whole: bool) -> dict[int, Outcome]:
-        """Make room for these parts, and return the outcomes of those that are already there.
+    def open(self, whole: bool) -> None:
+        """Make room for a batch, and look what is there.
 
         What a finished batch ends with goes first, so that nobody takes the folder for one.
 
         Parameters
         ----------
-        numbers : iterable of int
-            Of the parts.
         whole : bool
-            Whether these are all parts of the batch: then other parts are stale, and go.
+            Whether all parts of the batch are to be drawn, and not a share of them.
 
         Raises
         ------
         InputError
             The folder cannot be written.
         """
-        try:
+        self._whole = whole
+        with self._writing():
             self.path.mkdir(exist_ok=True)
             (self.path / file_io.MANIFEST).unlink(missing_ok=True)
             (self.path / file_io.TABLE).unlink(missing_ok=True)
-            parts = {file_of(number): number for number in numbers}
-            for stale in self.path.glob(_TEMPORARY):
-                # Another machine may be writing a part of its own share.
-                if whole or stale.name[1:].split(".parquet.")[0] + ".parquet" in parts:
-                    stale.unlink(missing_ok=True)
-            kept = {}
-            for file, number in parts.items():
-                outcome = self._outcome(file, number)
-                if outcome is None:
-                    (self.path / file).unlink(missing_ok=True)
-                else:
-                    kept[number] = outcome
             if whole:
-                for other in self.path.glob(file_io.PART):
-                    if other.name not in parts:
-                        other.unlink()
+                self._tidy(None)
+            self._there = file_io.parts_of(self.path)
+            self._told = self._ledger.read(self._there)
+            self._stale = set(self._there)
+
+    def kept(
+        self, numbers: Iterable[int], hashes: Callable[[int], list[list[str | None]]]
+    ) -> dict[int, Outcome]:
+        """Return the outcomes of those parts that are already there; what is left of others goes.
+
+        Parameters
+        ----------
+        numbers : iterable of int
+            Of the parts.
+        hashes : callable
+            Returns the hashes of the files that a part's own pairs lie on.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        kept = {}
+        with self._writing():
+            parts = {self.job.file_of(number): number for number in numbers}
+            if not self._whole:
+                self._tidy(parts)
+            for file, number in parts.items():
+                self._stale.discard(file)
+                if file not in self._there:
+                    continue
+                outcome = self._told.pop(file, None)
+                told = outcome is not None
+                outcome = outcome or self._outcome(file, number)
+                if outcome is None or outcome.number != number or outcome.sites != hashes(number):
+                    (self.path / file).unlink()
+                    continue
+                kept[number] = outcome
+                if not told:
+                    self._ledger.note(file, outcome)
+        return kept
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
-        return kept
+
+    def _tidy(self, parts: Container[str] | None, but: Path | None = None) -> None:
+        """Remove the halves that a run left which was killed: those of some parts, or all.
+
+        Another machine may be writing a part of its own share.
+        """
+        for stale in self.path.glob(f".{file_io.TABLE}.*.tmp") if parts is None else ():
+            if stale != but:
+                stale.unlink(missing_ok=True)
+        for folder in file_io.part_folders(self.path):
+            inner = "" if folder == self.path else f"{folder.name}/"
+            for stale in folder.glob(_TEMPORARY):
+                of = f"{inner}{stale.name[1:].split('.parquet.')[0]}.parquet"
+                if parts is None or of in parts:
+                    stale.unlink(missing_ok=True)
 
     def _outcome(self, name: str, number: int) -> Outcome | None:
         """Outcome of a part that is there, whole and of the same inputs; None otherwise."""
@@ -82,40 +140,77 @@ class Folder:
             footer = pq.read_metadata(file)
             found = json.loads((footer.metadata or {})[record.KEY])
             fact = found["facts"].pop(FACT)
+            if self._own:
+                # What is so for these surfaces alone.
+                found["facts"] = {k: v for k, v in found["facts"].items() if k in self._own}
+            if found != self._expected or fact.get("number") != number:
+                return None
+            return outcome_of(fact, footer.num_rows, file.stat().st_size)
         except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
-        if found != self._expected or fact.get("number") != number:
-            return None
-        return Outcome(
-            number,
-            {int(row): why for row, why in fact["failed"].items()},
-            {int(row): seconds for row, seconds in fact["clipped"].items()},
-            fact["unfolded"],
-            footer.num_rows,
-            file.stat().st_size,
-            pieces={int(row): ends for row, ends in fact.get("pieces", {}).items()},
-            slow=fact.get("slow", 0),
-        )
 
-    def leave(self) -> None:
-        """Leave no folder behind that nothing was drawn into."""
-        with contextlib.suppress(OSError):
-            self.path.rmdir()
+    def note(self, outcome: Outcome) -> None:
+        """Write down that a part was drawn.
 
-    def finish(self, table: Record, manifest: dict[str, Any]) -> None:
-        """Write the table of pairs and, last of all, the manifest.
+        Raises
+        ------
+        InputError
+            The ledger cannot be written.
+        """
+        if outcome.rows:
+            with self._writing():
+                self._ledger.note(self.job.file_of(outcome.number), outcome)
+
+    def add(self, table: Record) -> None:
+        """Write rows of the table of pairs, which grows beside its name.
 
         Raises
         ------
         InputError
             The folder cannot be written.
         """
-        # There is none where no pair could be drawn: its table says why.
+        with self._writing():
+            if self._table is None:
+                # There is none where no pair could be drawn: its table says why.
+                self.path.mkdir(exist_ok=True)
+                temporary, stream = file_io.temporary_of(self.path / file_io.TABLE)
+                self._table = temporary, stream, record.GrowingRecord(stream)
+            self._table[2].add(table)
+
+    def leave(self) -> None:
+        """End writing; leave no folder behind that nothing was drawn into."""
+        self._ledger.close()
+        if self._table is not None:
+            temporary, stream, _ = self._table
+            stream.close()
+            temporary.unlink(missing_ok=True)
         with contextlib.suppress(OSError):
-            self.path.mkdir(exist_ok=True)
-        # A worker that died in the middle of a part has left its half.
-        for stale in self.path.glob(_TEMPORARY):
-            stale.unlink(missing_ok=True)
-        file_io.write(self.path / file_io.TABLE, record.encode(table))
+            for folder in reversed(file_io.part_folders(self.path)):
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+
+    def finish(self, manifest: dict[str, Any]) -> None:
+        """Give the table of pairs its name and, last of all, write the manifest.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        assert self._table is not None
+        temporary, stream, table = self._table
+        with self._writing():
+            for stale in self._stale:
+                (self.path / stale).unlink()
+            # A worker that died in the middle of a part has left its half.
+            self._tidy(None, temporary)
+            table.close()
+            stream.flush()
+            os.fsync(stream.fileno())
+            stream.close()
+            temporary.replace(self.path / file_io.TABLE)
+        self._table = None
         text = json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
         file_io.write(self.path / file_io.MANIFEST, text.encode())
+        with contextlib.suppress(OSError):
+            self._ledger.remove()

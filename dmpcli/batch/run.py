@@ -3,23 +3,30 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.batch.cut import Cut, by_site, in_order
 from dmpcli.batch.dataset_folder import Folder
-from dmpcli.batch.part import Job, Outcome, Part, file_of
+from dmpcli.batch.part import Job, Outcome, Part
+from dmpcli.batch.site import PairSites, SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.time_scaling import timing
-from dmpcli.errors import RefusedError
+from dmpcli.errors import InputError, RefusedError
 from dmpcli.records import manifest, trajectory
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Record
 from dmpcli.records.schemas import OK
 from dmpcli.surfaces.plane import Plane, pair_charts
+
+MOST_IN_ONE = 4000
+"""Parts that lie in one folder; more are put into several."""
+
+SHOWN = 20
+"""Bad pairs that are named on the terminal; all are in the folder's table."""
 
 _AT_ONCE = 100_000
 """Pairs whose charts are laid at once."""
@@ -59,6 +66,12 @@ class Summary:
     slow : int
         Strokes that do not hold the speed that was asked for.
     parts : int
+    told : SitesTold
+        On surfaces that the table names.
+    rows, bad : int
+        Of the table, and those of them that have no stroke.
+    skipped : list of str
+        Why some of those have none: the first `SHOWN`.
     """
 
     drawn: int = 0
@@ -68,15 +81,20 @@ class Summary:
     split: int = 0
     slow: int = 0
     parts: int = 0
+    told: SitesTold = field(default_factory=SitesTold)
+    rows: int = 0
+    bad: int = 0
+    skipped: list[str] = field(default_factory=list)
 
 
 @dataclass
 class Batch:
-    """A table of pairs, cut into parts.
+    """A table of pairs, or a piece of one, cut into parts.
 
     Parameters
     ----------
     job : Job
+        Of all pieces.
     table : PairTable
         Pairs that cannot be drawn have their status; more get it here.
     pairs : Pairs
@@ -86,6 +104,12 @@ class Batch:
     size : int
         Pairs per part.
     shard : Shard
+    sites : PairSites, optional
+        Of the pairs, where the table names them.
+    most_sites : int
+        Sites in a part.
+    first_part : int
+        Number of its first part.
     """
 
     job: Job
@@ -94,23 +118,43 @@ class Batch:
     duration: Floats
     size: int
     shard: Shard = field(default_factory=Shard)
+    sites: PairSites | None = None
+    most_sites: int = 16
+    first_part: int = 0
 
     def __post_init__(self) -> None:
         self._admitted = self.table.good
         self._outcomes: dict[int, Outcome] = {}
 
+    @cached_property
+    def cut(self) -> Cut:
+        """Which rows each part has."""
+        if self.sites is None:
+            return in_order(len(self.table), self.size)
+        lift = np.array([site.offset for site in self.sites.sites] + [0.0])
+        return by_site(self.sites.of, lift[self.sites.of], self.size, self.most_sites)
+
     def _part(self, number: int) -> Part:
-        """Part n: rows n·size to (n+1)·size - 1."""
-        first = number * self.size
-        rows = first + np.flatnonzero(self._admitted[first : first + self.size])
+        rows = self.cut.rows(number - self.first_part)
+        rows = rows[self._admitted[rows]]
         ids = [self.table.ids[row] for row in rows.tolist()]
-        return Part(number, rows, ids, self.pairs[rows], self.duration[rows])
+        there = rows + self.table.before
+        part = Part(number, there, ids, self.pairs[rows], self.duration[rows])
+        if self.sites is None:
+            return part
+        used, site = np.unique(self.sites.of[rows], return_inverse=True)
+        return replace(part, sites=tuple(self.sites.sites[i] for i in used), site=site)
 
     @cached_property
     def sizes(self) -> dict[int, int]:
         """How many pairs each part of this shard is to draw; parts with none are left out."""
-        counts = np.bincount(np.flatnonzero(self._admitted) // self.size).tolist()
-        return {n: size for n, size in enumerate(counts) if size and self.shard.has(n)}
+        counts = np.bincount(self.cut.part[self._admitted]).tolist()
+        numbered = enumerate(counts, self.first_part)
+        return {n: size for n, size in numbered if size and self.shard.has(n)}
+
+    def _hashes(self, number: int) -> list[list[str | None]]:
+        """Hashes of the files that a part is drawn on, as they are now."""
+        return [site.hashes() for site in self._part(number).sites]
 
     @property
     def count(self) -> int:
@@ -118,38 +162,30 @@ class Batch:
         return sum(self.sizes.values())
 
     def run(self, draw: Draw, advance: Callable[[int], None]) -> Summary:
-        """Draw what is not there yet; with all parts there, write table and manifest.
+        """Draw the whole table, as `run`."""
+        return run(iter([self]), draw, advance)
 
-        Parameters
-        ----------
-        draw : callable
-            Of `dmpcli.batch.workers`.
-        advance : callable
-            Told how many pairs are done.
-
-        Returns
-        -------
-        Summary
+    def draw(
+        self, folder: Folder, draw: Draw, advance: Callable[[int], None], summary: Summary
+    ) -> None:
+        """Draw what is not there yet.
 
         Raises
         ------
-        RefusedError
-            A pair cannot be drawn, and the job is to stop then. Finished parts stay.
-        InputError
-            The folder cannot be written.
+        RefusedError, InputError
+            As `run`.
         """
-        folder = Folder(self.job)
-        kept = folder.open(self.sizes, self.shard.whole)
-        summary = Summary(kept=len(kept))
-        try:
-            for outcome in self._all(kept, draw):
-                self._note(outcome, self.sizes[outcome.number], summary)
-                advance(self.sizes[outcome.number])
-        finally:
-            folder.leave()
-        if self.shard.whole:
-            folder.finish(self._table(), self._manifest())
-        return summary
+        kept = folder.kept(self.sizes, self._hashes)
+        summary.kept += len(kept)
+        for outcome in self._all(kept, draw):
+            self._note(outcome, self.sizes[outcome.number], summary)
+            if outcome.number not in kept:
+                folder.note(outcome)
+            advance(self.sizes[outcome.number])
+        bad = [status for status in self.table.status if status != OK]
+        summary.rows += len(self.table)
+        summary.bad += len(bad)
+        summary.skipped += bad[: SHOWN - len(summary.skipped)]
 
     def _all(self, kept: dict[int, Outcome], draw: Draw) -> Iterator[Outcome]:
         yield from kept.values()
@@ -157,13 +193,18 @@ class Batch:
 
     def _note(self, outcome: Outcome, size: int, summary: Summary) -> None:
         self._outcomes[outcome.number] = outcome
-        for row, why in outcome.failed.items():
+        for there, why in outcome.failed.items():
+            row = there - self.table.before
             self.table.status[row] = f"{self.table.place(row)}, pair {self.table.ids[row]}: {why}"
+        for remark in outcome.told:
+            summary.told.add(remark)
         if outcome.fatal:
-            first = self.table.status[min(outcome.failed)]
-            raise RefusedError(
-                f"{self.table.name}: {first}; move the pair, or give --on-error skip"
+            said = (
+                f"{self.table.name}: {self.table.status[min(outcome.failed) - self.table.before]}"
             )
+            if not outcome.refused:
+                raise InputError(f"{said}; or give --on-error skip")
+            raise RefusedError(f"{said}; move the pair, or give --on-error skip")
         summary.parts += 1
         summary.drawn += size - len(outcome.failed)
         summary.failed += len(outcome.failed)
@@ -171,15 +212,20 @@ class Batch:
         summary.split += len(outcome.pieces)
         summary.slow += outcome.slow
 
-    def _table(self) -> Record:
+    def record(self) -> Record:
         """Return the table of pairs with what became of each; one row for each piece of a split."""
         good = self.table.good
-        names = [file_of(number) for number in range(len(self.table) // self.size + 1)]
-        numbers = np.arange(len(self.table)) // self.size
+        numbered = range(self.first_part, self.first_part + self.cut.count)
+        names = [self.job.file_of(number) for number in numbered]
+        numbers = self.cut.part
         files = [names[n] if drawn else "" for n, drawn in zip(numbers.tolist(), good, strict=True)]
         ids, pairs, lasting = self.table.ids, self._ends(good), self._lasting(good)
         normals, status = self._normals(good), self.table.status
-        pieces = {k: v for outcome in self._outcomes.values() for k, v in outcome.pieces.items()}
+        pieces = {
+            there - self.table.before: ends
+            for outcome in self._outcomes.values()
+            for there, ends in outcome.pieces.items()
+        }
         if pieces:
             counts = np.array([len(pieces.get(row, "1")) for row in range(len(ids))])
             rows = np.repeat(np.arange(len(ids)), counts)
@@ -195,10 +241,35 @@ class Batch:
             files = [files[row] for row in rows.tolist()]
             status = [status[row] for row in rows.tolist()]
         p = self.job.provenance
-        return trajectory.pairs_record(ids, pairs, lasting, normals, files, status, p)
+        on = None
+        if self.sites is not None:
+            on = self._surfaces(rows if pieces else np.arange(len(self.table)))
+        return trajectory.pairs_record(ids, pairs, lasting, normals, files, status, p, on)
+
+    def _surfaces(self, rows: Integers) -> tuple[list[str], list[str]]:
+        """Names and hashes of the surfaces of some rows; empty where there is none."""
+        assert self.sites is not None
+        names = [site.surface.name for site in self.sites.sites] + [""]
+        hashes = [site.hashes()[0] or "" for site in self.sites.sites] + [""]
+        of = self.sites.of[rows].tolist()
+        return [names[i] for i in of], [hashes[i] for i in of]
+
+    def _placed(self) -> tuple[Integers, Floats]:
+        """Rows (k,) whose table names their surfaces, and start, goal and normal of each (k, 9)."""
+        rows, places = [], []
+        for outcome in self._outcomes.values():
+            rows += list(outcome.placed)
+            places += [(place + [np.nan] * 3)[:9] for place in outcome.placed.values()]
+        there = np.array(rows, dtype=np.int64)
+        return there - self.table.before, np.array(places).reshape(-1, 9)
 
     def _ends(self, good: Booleans) -> Pairs:
         """Pairs with the ends that their strokes have themselves."""
+        if self.sites is not None:
+            rows, places = self._placed()
+            start, goal = self.pairs.start.copy(), self.pairs.goal.copy()
+            start[rows], goal[rows] = places[:, :3], places[:, 3:6]
+            return replace(self.pairs, start=start, goal=goal)
         if self.pairs.shift is None:
             return self.pairs
         task, rows = self.job.task, np.flatnonzero(good)
@@ -221,15 +292,18 @@ class Batch:
             )
             lasting[good & (self.duration == seconds)] = when.t[-1]
         for outcome in self._outcomes.values():
-            for row, seconds in outcome.clipped.items():
-                lasting[row] = seconds
+            for there, seconds in outcome.clipped.items():
+                lasting[there - self.table.before] = seconds
         return lasting
 
     def _normals(self, good: Booleans) -> Floats:
         """Unit normal of each pair's plane; NaN on a mesh, and where there is no stroke."""
         task, frame = self.job.task, self.job.task.skill.frame
         normal = np.full((len(self.table), 3), np.nan)
-        if isinstance(task.surface, Plane):
+        if self.sites is not None:
+            rows, places = self._placed()
+            normal[rows] = np.where(good[rows, None], places[:, 6:], np.nan)
+        elif isinstance(task.surface, Plane):
             normal[good] = task.surface.normal
         elif task.surface is None and task.skill.model == "original":
             normal[good] = frame.normal
@@ -241,10 +315,11 @@ class Batch:
                 normal[rows] = pair_charts(start, goal, frame.normal, task.skill.closed).normal
         return normal
 
-    def _manifest(self) -> dict[str, Any]:
-        entries = [
+    def entries(self) -> list[manifest.Entry]:
+        """Return what the manifest says of the parts."""
+        return [
             manifest.Entry(
-                file=file_of(number),
+                file=self.job.file_of(number),
                 pairs=size,
                 rows=self._outcomes[number].rows,
                 bytes=self._outcomes[number].size,
@@ -252,5 +327,50 @@ class Batch:
             for number, size in self.sizes.items()
             if self._outcomes[number].rows
         ]
-        drawn = self.table.status.count(OK)
-        return manifest.document(entries, len(self.table), drawn, self.job.provenance)
+
+
+def run(pieces: Iterator[Batch], draw: Draw, advance: Callable[[int], None]) -> Summary:
+    """Draw what is not there yet; with all parts there, write table and manifest.
+
+    Parameters
+    ----------
+    pieces : iterator of Batch
+        Of one table in its order, with one job and shard; each is let go before the next is asked
+        for.
+    draw : callable
+        Of `dmpcli.batch.workers`.
+    advance : callable
+        Told how many pairs are done.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    RefusedError
+        A pair cannot be drawn, and the job is to stop then. Finished parts stay.
+    InputError
+        The folder cannot be written.
+    """
+    summary, entries = Summary(), list[manifest.Entry]()
+    folder: Folder | None = None
+    try:
+        for piece in pieces:
+            if folder is None:
+                job, shard = piece.job, piece.shard
+                folder = Folder(job, f"{shard.index}-of-{shard.count}")
+                folder.open(shard.whole)
+            piece.draw(folder, draw, advance, summary)
+            if shard.whole:
+                folder.add(piece.record())
+                entries += piece.entries()
+        assert folder is not None
+        if shard.whole:
+            drawn = summary.rows - summary.bad
+            document = manifest.document(entries, summary.rows, drawn, job.provenance)
+            folder.finish(document)
+    finally:
+        if folder is not None:
+            folder.leave()
+    return summary

@@ -26,44 +26,65 @@ _job: Job | None = None
 
 def here(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
     """Draw the parts in this process."""
+    if job.prepare is None:
+        memory.keep()
     for part in parts:
         yield draw_part(job, part)
 
 
-def processes(count: int) -> Draw:
-    """Return what draws parts in so many processes of this machine."""
+class Processes:
+    """Draws parts in so many processes of this machine, which serve one job until they are closed.
 
-    def draw(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
-        pool = ProcessPoolExecutor(
-            count, mp_context=process_pool.context(), initializer=_begin, initargs=(job,)
-        )
+    Parameters
+    ----------
+    count : int
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __call__(self, job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
+        """Draw the parts."""
+        if self._pool is None:
+            context = process_pool.context()
+            self._pool = ProcessPoolExecutor(
+                self._count, mp_context=context, initializer=_begin, initargs=(job,)
+            )
         waiting: set[Future[Outcome]] = set()
+        done = False
         try:
             for part in parts:
-                waiting.add(pool.submit(_draw, part))
-                if len(waiting) >= _AHEAD * count:
-                    done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                    yield from (future.result() for future in done)
+                waiting.add(self._pool.submit(_draw, part))
+                if len(waiting) >= _AHEAD * self._count:
+                    ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    yield from (future.result() for future in ended)
             while waiting:
-                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                yield from (future.result() for future in done)
+                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in ended)
+            done = True
         except BrokenProcessPool:
             raise InputError(
                 "a process that draws was killed, perhaps for want of memory; the same command "
                 "goes on from here: try fewer --jobs or --pairs-per-part"
             ) from None
         finally:
-            # Parts in hand are finished: they need not be drawn again.
-            pool.shutdown(wait=True, cancel_futures=True)
+            if not done:
+                self.close()
 
-    return draw
+    def close(self) -> None:
+        """End the processes. Parts in hand are finished: they need not be drawn again."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
 
 
 def _begin(job: Job) -> None:
     """Begin a process that draws: the job comes once, and Ctrl-C is its parent's affair."""
     global _job
     _job = job
-    memory.keep()
+    if job.prepare is None:  # else each part takes another amount, of meshes
+        memory.keep()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

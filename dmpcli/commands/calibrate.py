@@ -35,7 +35,10 @@ def command(
     ],
     tool: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where TCP and sensor sit; the mock knows its own."),
+        typer.Option(
+            metavar="FILE",
+            help="Tool file: where TCP and sensor sit.  [default: the mock knows its own]",
+        ),
     ] = None,
     robot: Robot = "mock:",
     sensor: Sensor = "mock:",

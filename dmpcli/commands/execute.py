@@ -5,11 +5,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from dmpcli.commands.options import SENSORS, AllowMixed, Quiet, Realtime, Robot
+from dmpcli.commands.options import ARMS, SENSORS, AllowMixed, Quiet, Realtime, Robot, urls
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
 from dmpcli.settings.execute import ExecuteSettings
-from dmpcli.settings.options import Given, with_options
+from dmpcli.settings.options import Given, choice, with_options
 
 
 @with_options
@@ -20,21 +20,38 @@ def command(
     ],
     output: Annotated[
         str | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Run file; - is stdout."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Run file; - is stdout. Needed but for --dry-run.",
+        ),
     ] = None,
     robot: Robot = "mock:",
     sensor: Annotated[
         str | None,
-        typer.Option(metavar="URL", help=f"With --coupling force mock: if not given. {SENSORS}"),
+        typer.Option(
+            metavar="URL",
+            help=f"The force sensor: {SENSORS}  [default: none; with --coupling force mock:]",
+            autocompletion=urls("sensor"),
+        ),
     ] = None,
     tool: Annotated[Path | None, typer.Option(metavar="FILE", help="Tool file.")] = None,
     robot_model: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Check the joints of this arm too: ec66, ur5e."),
+        typer.Option(
+            metavar="NAME",
+            help="Check the joints of this arm too: ec66, ur5e.",
+            autocompletion=choice(*ARMS),
+        ),
     ] = None,
     coupling: Annotated[
         Literal["force"] | None,
-        typer.Option(metavar="force", help="Press on the surface, eq. (10)."),
+        typer.Option(
+            metavar="force",
+            help="Press on the surface, eq. (10).",
+            autocompletion=choice("force"),
+        ),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only check; print the verdict, send nothing.")
@@ -42,7 +59,7 @@ def command(
     stroke_ids: Annotated[
         list[str] | None,
         typer.Option(
-            "--id", metavar="ID", help="Which of several strokes, in this order; all by default."
+            "--id", metavar="ID", help="Which of several strokes, in this order.  [default: all]"
         ),
     ] = None,
     settings: ExecuteSettings,
@@ -54,6 +71,12 @@ def command(
         typer.Option(
             "--allow-file-mode",
             help="Let the controller play the plan, though the arm draws on if the link is lost.",
+        ),
+    ] = False,
+    ignore_events: Annotated[
+        bool,
+        typer.Option(
+            "--ignore-events", help="Switch no outputs, though the trajectory asks for it."
         ),
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
@@ -80,6 +103,7 @@ def command(
         force,
         dry_run,
         allow_file_mode,
+        ignore_events,
     )
     run = execute(settings, request).run
     if run is not None and run.signal is not None:

@@ -19,7 +19,7 @@ def command(
     demonstrations: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DEMONSTRATION...",
+            metavar="DEMONSTRATION",
             help="Recordings: ours, or any CSV or Parquet with t, x, y, z; - is standard input.",
             show_default=False,
         ),

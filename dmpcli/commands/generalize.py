@@ -1,17 +1,22 @@
 """``dmpcli generalize``: a skill and new start-goal pairs in, trajectories out."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dmpcli.commands.options import SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
+from dmpcli.commands.options import ARMS, SURFACES, Point, Quiet, SurfacePose, SurfaceUnit
 from dmpcli.commands.process_options import KeepOut
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal, tell
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
-from dmpcli.settings.options import Given, with_options
+from dmpcli.settings.options import Given, choice, with_options
+
+if TYPE_CHECKING:
+    from dmpcli.records.pairs import PairTable
+    from dmpcli.workflows.generalize import Ready
 
 
 @with_options
@@ -48,7 +53,8 @@ def command(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration].",
+            help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration] and, of each "
+            "pair's own surface, [surface surface_unit pose in offset].",
         ),
     ] = None,
     surface: Annotated[
@@ -64,7 +70,9 @@ def command(
     robot_model: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Check reach, joint limits and speeds of an arm: ec66, ur5e."
+            metavar="NAME",
+            help="Check reach, joint limits and speeds of an arm: ec66, ur5e.",
+            autocompletion=choice(*ARMS),
         ),
     ] = None,
     tool: Annotated[
@@ -76,7 +84,7 @@ def command(
     """Draw a skill at new start and goal points."""
     on_terminal(quiet)
     from dmpcli.commands import batches as batch_options
-    from dmpcli.records import file_io, learned_skill
+    from dmpcli.records import file_io, learned_skill, pair_stream
     from dmpcli.records import pairs as pair_file
     from dmpcli.records.record import encode
     from dmpcli.workflows import batches, process, single, surface_input
@@ -84,53 +92,79 @@ def command(
     from dmpcli.workflows.generalize_inputs import one_pair
 
     batch_options.check(wanted, given, pairs is not None)
-    _check_together(pairs, (start_orientation, goal_orientation), surface, given)
-    process.check(settings, given, surface, keep_out)
-    surface_input.check_options(surface, surface_pose, surface_unit)
-    _check_frame(place.in_, surface, reproduce)
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import process_pool
 
         process_pool.begin()
+    table = stream = None
+    sha256 = ""
+    if pairs is not None:
+        stream = pair_stream.opened(pairs)
+        if stream is not None:
+            table, sha256 = stream.first(), stream.sha256
+        else:
+            source = file_io.read(pairs)
+            table, sha256 = pair_file.read(source), source.sha256
+    # A table may name surfaces itself, or some of them.
+    named = surface or (pairs if table is not None and table.places is not None else None)
+    _check_together(pairs, (start_orientation, goal_orientation), named, given)
+    process.check(settings, given, named, keep_out)
+    surface_input.check_options(named, surface_pose, surface_unit)
+    _check_frame(place.in_, named, reproduce)
     learned = learned_skill.read(file_io.read(skill))
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
+    sites = table is not None and table.places is not None
     read = None
-    if surface is not None:
+    if surface is not None and not sites:
         read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
     inputs: list[dict[str, str]] = []
-    if pairs is None:
+    if table is None:
         assert start is not None
         assert goal is not None
         table = one_pair(start, goal, start_orientation, goal_orientation)
         options = {"start_orientation": start_orientation, "goal_orientation": goal_orientation}
     else:
-        source = file_io.read(pairs)
-        table, options = pair_file.read(source), wanted.as_options()
-        inputs.append({"role": "pairs", "sha256": source.sha256})
-    ready = prepared(
-        Order(
-            learned,
-            table,
-            settings,
-            read,
-            place.in_,
-            place.on_border,
-            keep_out,
-            robot_model,
-            tool,
-            wanted.stop,
-            options,
-            inputs,
-        )
+        options = wanted.as_options(sites)
+        inputs.append({"role": "pairs", "sha256": sha256})
+    order = Order(
+        learned,
+        table,
+        settings,
+        read,
+        place.in_,
+        place.on_border,
+        keep_out,
+        robot_model,
+        tool,
+        wanted.stop,
+        options,
+        inputs,
     )
     if pairs is None:
-        drawn = single.draw_one(ready)
+        drawn = single.draw_one(prepared(order))
         file_io.write(output, encode(drawn.record))
         tell(f"{file_io.shown(output, output=True)}: {drawn.said}")
-    else:
-        batches.write(ready, output, wanted)
+        return
+
+    def ready_of(some: "PairTable") -> "Ready":
+        if not sites:
+            return prepared(replace(order, table=some, inputs=list(inputs)))
+        from dmpcli.workflows.generalize_sites import Otherwise, prepared_sites
+
+        otherwise = Otherwise(
+            None if surface is None else str(surface), surface_pose, surface_unit, place.in_
+        )
+        folder = Path() if str(pairs) == file_io.DASH else pairs.parent
+        mine = replace(order, table=some, inputs=list(inputs))
+        return prepared_sites(mine, folder, otherwise, wanted.surface_cache)
+
+    if stream is not None:
+        batches.write_pieces(stream, ready_of, output, wanted)
+        return
+    batches.tell_of_unknown(table)
+    batches.write(ready_of(table), output, wanted)
 
 
 def _check_together(

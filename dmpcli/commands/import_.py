@@ -19,7 +19,7 @@ def command(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Tables (CSV, Parquet, TUM), MCAP files, folders of ROS 2 bags and of LeRobot "
             "datasets, SVG drawings, G-code, URScript, KRL, RAPID; - is standard input.",
             show_default=False,

@@ -6,11 +6,15 @@ import typer
 
 from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
+from dmpcli.settings.options import choice, with_options
+from dmpcli.settings.recording import RecordingOptions
 
 _WIDTH = 80
 
 
+@with_options
 def command(
+    *,
     file: Annotated[
         str | None,
         typer.Argument(
@@ -24,11 +28,15 @@ def command(
         typer.Option(
             metavar="NAME",
             help="Print the JSON Schema of skill, plane, cylinder, sphere or tool files instead.",
+            autocompletion=choice(
+                "skill", "plane", "cylinder", "sphere", "tool", "pose", "manifest"
+            ),
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    form: RecordingOptions,
 ) -> None:
-    """Say what a file is: schema, columns, units, ranges, provenance."""
+    """Say what a file is: schema, columns, units, ranges, provenance; and how fit reads it."""
     on_terminal(quiet=False)
     from dmpcli.records import file_io
     from dmpcli.reporting import inspection
@@ -40,6 +48,6 @@ def command(
         raise InputError("FILE is missing: name a file, or - for standard input")
     from dmpcli.workflows.inspect import inspect
 
-    found = inspect(file)
+    found = inspect(file, form.as_layout(), form.as_words())
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
     file_io.say(text)

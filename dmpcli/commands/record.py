@@ -20,7 +20,8 @@ def command(
     sensor: Sensor = "mock:",
     robot: Robot = "mock:",
     tool: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Tool file; the mock knows its own.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Tool file.  [default: the mock knows its own]"),
     ] = None,
     settings: RecordSettings,
     given: Given,

@@ -18,7 +18,7 @@ def command(
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Demonstrations, trajectories, batch folders, runs and skills; - is standard "
             "input. The first demonstration is what the others are compared with.",
             show_default=False,
@@ -30,6 +30,16 @@ def command(
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
+    pairs: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The table that a batch was drawn from, if it names surfaces."
+        ),
+    ] = None,
+    surface_cache: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep prepared meshes of --pairs here for later runs."),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -66,7 +76,9 @@ def command(
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
-    surface_input.check_options(surface, surface_pose, surface_unit)
+    surface_input.check_options(pairs or surface, surface_pose, surface_unit)
+    if surface_cache is not None and pairs is None:
+        raise InputError("--surface-cache: belongs to --pairs; leave it out")
     check_output(output)
     if output is None and (view or show):
         raise InputError("--view and --open need the folder of the pages: give -o DIR")
@@ -75,10 +87,17 @@ def command(
 
         check()
     layout = form.as_layout()
-    read = None
-    if surface is not None:
+    read = grounds = None
+    if pairs is not None:
+        from dmpcli.workflows.generalize_sites import Otherwise
+        from dmpcli.workflows.report_sites import SiteGrounds
+
+        named = None if surface is None else str(surface)
+        otherwise = Otherwise(named, surface_pose, surface_unit)
+        grounds = SiteGrounds(pairs, otherwise, surface_cache)
+    elif surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output, paper, view, png)
+    made = report(files, None, layout, read, output, grounds, paper, view, png)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
     if show and output is not None:
         typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))

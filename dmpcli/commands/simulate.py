@@ -34,12 +34,14 @@ def command(
     served: SimulateOptions,
     surface: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help=f"What the tool touches: {SURFACES}; else a flat plate."),
+        typer.Option(
+            metavar="FILE", help=f"What the tool touches: {SURFACES}.  [default: a flat plate]"
+        ),
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
     tool: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The tool as it truly is; else a pen.")
+        Path | None, typer.Option(metavar="FILE", help="The tool as it truly is.  [default: a pen]")
     ] = None,
     drawn: Annotated[
         str | None,
@@ -73,6 +75,12 @@ def command(
         setting = _on(surface, surface_pose, surface_unit, setting)
     elif surface_pose is not None or surface_unit is not None:
         raise InputError("--surface-pose, --surface-unit: say which surface with --surface")
+    if served.physics == "mujoco":
+        from dataclasses import replace
+
+        from dmpcli.bench.lab_arm import BenchArm
+
+        setting = replace(setting, physics=BenchArm)
     ports = Ports(
         served.sensor_port,
         served.http_port,

@@ -35,11 +35,26 @@ Pose = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class ReadyArm:
-    """A robot that stands ready, and the clock it runs on."""
+    """A robot that stands ready, and the clock it runs on.
+
+    Attributes
+    ----------
+    servo : Servo
+    info : ServoInfo
+    clock : Clock
+    joints : int
+        How many joint angles its states tell; 0 where none.
+    """
 
     servo: Servo
     info: ServoInfo
     clock: Clock
+    joints: int = 0
+
+    def as_told(self) -> "ReadyArm":
+        """Return the arm with as many joints as its state tells now."""
+        told = self.servo.state().joints
+        return replace(self, joints=0 if told is None else len(told))
 
 
 @dataclass(frozen=True)
@@ -229,8 +244,12 @@ class ControlLoop(ABC):
             finally:
                 # Also on a defect of ours: nothing may leave the arm moving.
                 watch = self._moved and not self._rested
-                self.stop_outcome = stopping.stop(self._arm.servo, self._arm.clock, watch)
+                servo, clock = self._arm.servo, self._arm.clock
+                self.stop_outcome = stopping.stop(servo, clock, watch, self._leave)
         return how, failure
+
+    def _leave(self) -> None:  # noqa: B027  # most loops switch nothing on
+        """Leave what else is on once the arm was told to stop; raises nothing."""
 
     def _outcome(self, how: str, failure: DmpError | None, ended: str) -> LoopOutcome:
         """Put together how it ended, from what `_run` returns and the end that nothing forced."""

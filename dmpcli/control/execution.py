@@ -1,15 +1,17 @@
 """What one execution is made of: mock scene, checked plan, sense of touch, run file."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmpcli.admittance.compensation import Compensation
 from dmpcli.admittance.force_coupling import Filter, fast_filter
-from dmpcli.arrays import Floats
+from dmpcli.arrays import AnyArray, Floats
 from dmpcli.control import guards
+from dmpcli.control.contact_policy import ContactEvent, ContactPolicy
+from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import LONG, ForceInput, ForceTracker
@@ -19,7 +21,6 @@ from dmpcli.errors import InputError
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
 from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
-from dmpcli.metrics.contact import contact
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import limits_of
@@ -27,8 +28,10 @@ from dmpcli.planning.plan import Plan, PlannedStroke
 from dmpcli.planning.preflight import Check
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION
 from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.simulation.mock import Plate, Scene
+from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
@@ -174,6 +177,8 @@ def touch(
     arm: ReadyArm,
     coupling: Filter | None,
     tool_check: float | None = None,
+    policy: ContactPolicy | None = None,
+    told: Callable[[ContactEvent], None] = lambda _: None,
 ) -> ForceInput:
     """Let the sensor stream at rest, and return what the loop feels with.
 
@@ -189,6 +194,10 @@ def touch(
         None: only log the wrench.
     tool_check : float, optional
         By how much the tool's zero may miss the reading at rest, N; None does not check it.
+    policy : ContactPolicy, optional
+        Of the coupling.
+    told : callable
+        Told how the contact changes, as it does.
 
     Raises
     ------
@@ -203,9 +212,9 @@ def touch(
     sensing = Sensing(sensor, info, rate, plan.period, arm.clock)
     zeroed = sensing.zeroed(tool, plan.rotation[0], ZERO_TIME, tool_check)
     pressing = None
-    if coupling is not None:
-        lookahead = arm.info.lookahead
-        pressing = ForceTracker(settings.law(lookahead), coupling, plan, lookahead)
+    if coupling is not None and policy is not None:
+        supervisor = ContactSupervisor(policy, plan.period, told)
+        pressing = ForceTracker(supervisor, coupling, plan, settings.force_setpoint)
     return ForceInput(sensing, Compensation(zeroed), pressing)
 
 
@@ -220,16 +229,57 @@ def coupling_filter(
     Raises
     ------
     InputError
-        The trajectory states no normal, no set-point was given, or the model is unstable.
+        The trajectory states no normal, a set-point is too large, or the gains are unstable.
     """
     if stroke.normal is None:
         raise InputError(
             "--coupling force: the trajectory states no surface normal to press along; "
             "make it anew with generalize"
         )
-    settings.law()
+    settings.setpoint(_largest(stroke))
+    settings.chosen_gains()
     tau = float(facts.get("tau") or stroke.t[-1] - stroke.t[0])
     return fast_filter(tau / settings.speed, settings.period)
+
+
+def _largest(stroke: PlannedStroke) -> float | None:
+    return None if stroke.force is None else float(stroke.force.max())
+
+
+def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: float) -> ContactPolicy:
+    """Return what the coupling goes by in a run of these strokes.
+
+    Parameters
+    ----------
+    batch : StrokeSelection
+    settings : ExecuteSettings
+    lookahead : float
+        Of the arm, s.
+    """
+    own = [largest for stroke in batch.strokes if (largest := _largest(stroke))]
+    setpoint = settings.setpoint(max(own, default=None))
+    return ContactPolicy(
+        setpoint,
+        # A set-point near or below it would count as no contact.
+        min(settings.coupling_contact, setpoint / 2.0),
+        settings.reach,
+        settings.coupling_seek,
+        settings.coupling_release,
+        settings.clamp,
+        settings.coupling_rate,
+        settings.coupling_limit,
+        settings.coupling_drag,
+        settings.coupling_rub,
+        settings.coupling_patience,
+        settings.on_contact_loss,
+        lookahead,
+        settings.stiffness,
+        settings.delay,
+        settings.chosen_gains(),
+        settings.coupling_stiffness,
+        settings.coupling_zero_limit,
+        settings.min_contact / 100.0,
+    )
 
 
 def coupling_of(batch: StrokeSelection, settings: ExecuteSettings) -> Filter:
@@ -244,7 +294,7 @@ def coupling_of(batch: StrokeSelection, settings: ExecuteSettings) -> Filter:
     return filters[0]
 
 
-def facts_of(arm: ReadyArm, coupling: Filter | None, settings: ExecuteSettings) -> dict[str, Any]:
+def facts_of(arm: ReadyArm, coupling: Filter | None) -> dict[str, Any]:
     """Return the arm's look-ahead and the gains that were chosen on the normal axis."""
     lookahead = arm.info.lookahead
     if isinstance(arm.servo, PlanPlayer):
@@ -252,9 +302,7 @@ def facts_of(arm: ReadyArm, coupling: Filter | None, settings: ExecuteSettings) 
     if coupling is None:
         return {"lookahead": lookahead}
     gains = {"k": coupling.k, "d": coupling.d, "tau": coupling.tau, "alpha_e": coupling.alpha_e}
-    model = settings.law(lookahead).model
-    of_model = {"mass": float(model.mass[0]), "damping": float(model.damping[0])}
-    return {"lookahead": lookahead, "coupling": gains | of_model}
+    return {"lookahead": lookahead, "coupling": gains}
 
 
 def slowed(lookahead: float) -> str:
@@ -269,13 +317,24 @@ def slowed(lookahead: float) -> str:
 
 def pressed(pressing: ForceTracker) -> str:
     """Say how hard the coupling pressed, and for how much of the stroke it did not."""
-    if not pressing.felt:
+    found = pressing.facts().get("contact")
+    if found is None:
         return "no stroke was drawn under force"
-    how = contact(np.array(pressing.felt), pressing.law.contact)
-    return (
-        f"force along the normal {how.mean:.2f} N in the mean, {how.least:.2f} to "
-        f"{how.largest:.2f} N; no contact on {100.0 * how.absent:.3g} % of the stroke"
+    said = (
+        f"force along the normal {found['mean']:.2f} N in the mean, {found['least']:.2f} to "
+        f"{found['largest']:.2f} N, RMS error {found['rms_error']:.2f} N; no contact on "
+        f"{100.0 * (1.0 - found['share']):.3g} % of the stroke"
     )
+    if "stiffness" in found:
+        said += (
+            f"; landed with {found['landing_peak']:.2f} N at the most, on {found['stiffness']:.3g} "
+            f"N/mm behind {found['delay']:.2g} s"
+        )
+    if found["saturated"]:
+        said += f"; at its limits on {100.0 * found['saturated']:.2g} % of the stroke"
+    if "oscillating" in {event.state for event in pressing.supervisor.events}:
+        said += "; the force swung, and the gains were softened"
+    return said
 
 
 def watch(settings: ExecuteSettings) -> StopLimits:
@@ -291,7 +350,11 @@ def watch(settings: ExecuteSettings) -> StopLimits:
 
 
 def record_of(
-    loop: PlanLoop, outcome: LoopOutcome, provenance: Provenance, realtime: bool
+    loop: PlanLoop,
+    outcome: LoopOutcome,
+    provenance: Provenance,
+    realtime: bool,
+    reach: Reach | None = None,
 ) -> Record:
     """Return the run as a record.
 
@@ -304,6 +367,8 @@ def record_of(
         What was known before.
     realtime : bool
         Lateness is a fact only where a clock ran: a simulated run is the same every time.
+    reach : Reach, optional
+        The arm whose joint angles follow from the poses where no driver told them.
     """
     facts = provenance.facts | {
         "reason": outcome.reason,
@@ -313,12 +378,45 @@ def record_of(
     facts |= loop.stop_outcome.facts()
     if realtime:
         facts |= loop.timing.facts()
-    if loop.pressing is not None and loop.pressing.felt:
-        felt = np.array(loop.pressing.felt)
-        facts["contact"] = asdict(contact(felt, loop.pressing.law.contact))
+    if loop.pressing is not None:
+        facts |= loop.pressing.facts()
+        if "coupling" in facts:
+            facts["coupling"] = facts["coupling"] | loop.pressing.gains()
     if "strokes" in facts:
         facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
-    return Record(schemas.RUN, loop.log.columns(), replace(provenance, facts=facts))
+    columns = loop.log.columns()
+    joints = joints_of(columns, reach, loop.plan.period)
+    if joints:
+        arm = None if reach is None else reach.arm.name
+        facts["joints"] = {"arm": arm, "measured": JOINTS[0] in columns}
+    return Record(schemas.RUN, columns | joints, replace(provenance, facts=facts))
+
+
+def joints_of(
+    columns: Mapping[str, AnyArray], reach: Reach | None, period: float
+) -> dict[str, AnyArray]:
+    """Return the columns of the joint angles of a run: as told, else by the arm's kinematics.
+
+    Parameters
+    ----------
+    columns : dict of array
+        Of the run.
+    reach : Reach or None
+    period : float
+        s.
+
+    Returns
+    -------
+    dict of array
+        None where nothing is known of them, or the arm does not reach a pose.
+    """
+    told = {name: columns[name] for name in JOINTS if name in columns}
+    if told or reach is None:
+        return told
+    position = np.column_stack([columns[name] for name in POSITION])
+    rotation = from_euler(np.column_stack([columns[name] for name in EULER_ANGLES]))
+    q = reach.follow(position[None], rotation[None], period).joints[0]
+    return {} if np.isnan(q).any() else dict(zip(JOINTS, q.T, strict=False))
 
 
 def progress_of(ids: Sequence[str], drawn: Sequence[str]) -> dict[str, list[str]]:

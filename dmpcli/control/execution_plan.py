@@ -71,7 +71,7 @@ def ways(settings: ExecuteSettings, lookahead: float, presses: bool) -> Transfer
         The coupling may displace the tool by as much as the clearance.
     """
     clearance = CLEARANCE if settings.clearance is None else settings.clearance
-    spare = settings.coupling_clamp if presses else 0.0
+    spare = settings.clamp if presses else 0.0
     if spare >= clearance:
         raise InputError(
             f"--clearance {clearance:g}: must be over {spare:g} mm, by which the force coupling "

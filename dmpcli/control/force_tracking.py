@@ -1,24 +1,27 @@
 """What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dmpcli.admittance import force_coupling
-from dmpcli.admittance.force_coupling import CouplingLaw, Displacement, Filter
+from dmpcli.admittance.force_coupling import Filter
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
+from dmpcli.control.contact_policy import ContactPolicy
+from dmpcli.control.contact_supervisor import ContactSupervisor
+from dmpcli.control.contact_tally import ContactTally
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.plan import Plan
 
-# The force has settled when it stays this near to the set-point for this long.
-SETTLED_SHARE, SETTLED_TIME = 0.1, 0.1
 LONG = 0.15
 """A look-ahead beyond which the coupling holds the force badly, s."""
-# A coupling so slow that it has found nothing by then is a mistake, s.
-LONGEST_SEEKING = 60.0
+
+# What the tool meets on its way down, before the zero is taken, as a multiple of the set-point.
+_MET = 1.0
 
 
 class ForceTracker:
@@ -26,74 +29,72 @@ class ForceTracker:
 
     Parameters
     ----------
-    law : CouplingLaw
+    supervisor : ContactSupervisor
+        One for all strokes of a run.
     filter_ : Filter
         Of the plan's servo period.
     plan : Plan
         With normals.
-    lookahead : float
-        By how much the arm lags its set-points, s: what the force does is
-        seen that much later, and must have lasted so long.
+    override : float or None
+        F_d of all of the stroke that is drawn in contact, N; None takes the plan's own.
+    tally : ContactTally, optional
+        Of the strokes before.
 
     Attributes
     ----------
-    law : CouplingLaw
-    felt : list of float
-        Forces along the normal on the stroke, of `on` on all strokes, N.
-    e : float
-        Output of the admittance model, mm along the normal.
+    supervisor : ContactSupervisor
+    tally : ContactTally
+        What was felt on the strokes, with `on` of all of them.
     """
 
     def __init__(
-        self, law: CouplingLaw, filter_: Filter, plan: Plan, lookahead: float = 0.0
+        self,
+        supervisor: ContactSupervisor,
+        filter_: Filter,
+        plan: Plan,
+        override: float | None = None,
+        tally: ContactTally | None = None,
     ) -> None:
-        self.law = law
-        self._lookahead = lookahead
-        self._filter = filter_
-        self._plan = plan
-        self._state = Displacement()
-        self._delta = np.zeros(2)
-        self._calm = 0.0
-        self._found = False
-        self.felt: list[float] = []
-        self._sought = 0.0
-        self._seek = law.setpoint / float(law.model.damping[0])  # mm/s, without contact
         if plan.normal is None:
             raise ValueError("a plan without normals has nothing to press along")
-        lift = np.sum(np.diff(plan.position, axis=0) * plan.normal[:-1], axis=-1) / plan.period
-        self._retreats = np.append(lift > self._seek, False)
+        self.supervisor, self._filter, self._plan = supervisor, filter_, plan
+        self._override = override
+        self.tally = ContactTally() if tally is None else tally
+        self.tally.begin(plan.id)
+        self._delta = np.zeros(2)
+        self._zero, self._zeros = np.zeros(3), 0
+        self._wanted = _setpoints(plan, supervisor.policy.setpoint, override)
         self._reach = float((plan.position[-1] - plan.position[plan.last]) @ plan.normal[-1])
+        self._lifts = _lead(plan, supervisor.policy)
+        self._lift = supervisor.policy.reach
+        supervisor.lifted(0.0)
+        supervisor.begin(airborne=self._wanted[plan.lead] <= 0.0)
 
     def on(self, plan: Plan) -> "ForceTracker":
-        """Return the same law and filter on another plan; nothing was felt there yet."""
-        other = ForceTracker(self.law, self._filter, plan, self._lookahead)
-        other.felt = self.felt
-        return other
+        """Return the same supervisor and filter on another plan; nothing was felt there yet."""
+        return ForceTracker(self.supervisor, self._filter, plan, self._override, self.tally)
 
     @property
     def e(self) -> float:
-        """Output of the admittance model, mm along the normal."""
-        return self._state.e
+        """Output of the law, mm along the normal."""
+        return self.supervisor.e
 
     @property
     def settled(self) -> bool:
-        """The force has stayed near its set-point."""
-        return self._calm >= max(SETTLED_TIME, self._lookahead)
+        """The stroke may begin: the force holds its set-point, or is not asked for at its start."""
+        return self.supervisor.settled
 
     @property
-    def given_up(self) -> str:
-        """Why no contact can be had; empty while there is hope."""
-        law = self.law
-        if not self._state.touched and law.clamp - abs(self._state.e) < 1e-9:
-            return f"no contact within {law.clamp:g} mm of the plan"
-        if self._sought > min(5.0 + 2.0 * law.clamp / self._seek, LONGEST_SEEKING):
-            said = f"the force does not settle at {law.setpoint:g} N"
-            if self._lookahead > LONG:
-                return f"{said} behind a look-ahead of {self._lookahead:g} s, which is long"
-            return said
-        return ""
+    def failure(self) -> str:
+        """Why the run must end; empty while it need not."""
+        return self.supervisor.failure
 
-    def displace(self, index: float, wrench: Floats) -> Floats:
+    def wanted(self, index: float) -> float:
+        """F_d at a set-point's number, N; 0 where the tool is lifted, and off the stroke."""
+        number = int(index + 1e-9)
+        return float(self._wanted[min(number, len(self._wanted) - 1)])
+
+    def displace(self, index: float, wrench: Floats, t: float = 0.0) -> Floats:
         """Return what to add to the set-point, shape (3,), mm.
 
         Parameters
@@ -102,20 +103,59 @@ class ForceTracker:
             Number of the set-point.
         wrench : array, shape (6,)
             On the tool, base axes, N and N·m.
+        t : float
+            s since the first set-point.
         """
-        normal, period = self._plan.normal_at(index), self._plan.period
-        force = float(normal @ wrench[:3])
-        near = abs(force - self.law.setpoint) <= SETTLED_SHARE * self.law.setpoint
-        self._calm = self._calm + period if near else 0.0
-        self._sought += period
-        retreat = bool(self._retreats[min(int(index), len(self._plan) - 1)])
-        self._found = self._found or self.settled
-        if index > self._plan.lead:
-            self.felt.append(force)
-        # Until it has settled once, a contact that is lost again is sought like the first.
-        state = self._state if self._found else replace(self._state, touched=False)
-        self._state = force_coupling.displace(self.law, state, force, retreat)
-        self._delta = force_coupling.follow(self._filter, self._delta, self._state.e)
+        supervisor, plan = self.supervisor, self._plan
+        normal, R = plan.normal_at(index), plan.rotation[min(round(index), len(plan) - 1)]
+        if supervisor.zeroing:
+            self._zero = self._zero + R.T @ wrench[:3]
+            self._zeros += 1
+        elif self._zeros:
+            self._zero = self._zero / self._zeros
+            self._zeros = 0
+            supervisor.zero_is(t, float(np.linalg.norm(self._zero)))
+        felt = wrench[:3] if self._zeros else wrench[:3] - R @ self._zero
+        force = float(normal @ felt)
+        off = felt - force * normal
+        wanted = self.wanted(index)
+        supervisor.step(t, force, float(np.sqrt(off @ off)), wanted)
+        if index > plan.lead and wanted > 0.0:
+            touching = force > min(supervisor.policy.contact, wanted / 2.0)
+            self.tally.add(force, wanted, touching and not supervisor.doubted, supervisor.saturated)
+        self._delta = force_coupling.follow(self._filter, self._delta, supervisor.e)
+        return self.hold(index)
+
+    def come(self, index: float, wrench: Floats | None, t: float) -> Floats:
+        """Return what to add on the way to the stroke: it ends over the plan, by the reach.
+
+        What is met there, before anything was looked for, ends the run.
+
+        Parameters
+        ----------
+        index : float
+            Number of a set-point before the stroke's first.
+        wrench : array, shape (6,), or None
+            As in `displace`.
+        t : float
+            s.
+        """
+        plan, supervisor = self._plan, self.supervisor
+        normal = plan.normal_at(index)
+        e = self._lift * float(self._lifts[int(index)])
+        supervisor.lifted(e)
+        if wrench is not None:
+            force = float(normal @ wrench[:3])
+            most = _MET * supervisor.policy.setpoint + supervisor.policy.zero_limit
+            if force > most:
+                supervisor.fail(
+                    t,
+                    "too hard",
+                    f"{force:.1f} N on the way down to stroke {plan.id}: the surface lies nearer "
+                    f"than {self._lift:g} mm over the plan; see where the part is",
+                    urgent=True,
+                )
+        self._delta = force_coupling.follow(self._filter, self._delta, e)
         return self.hold(index)
 
     def hold(self, index: float) -> Floats:
@@ -137,7 +177,7 @@ class ForceTracker:
         held: Floats = self._delta[0] * self._plan.normal_at(index)
         return held
 
-    def leave(self, index: float) -> Floats:
+    def leave(self, index: float, t: float = 0.0) -> Floats:
         """Return the last displacement on the way off the work: it ends where that way ends.
 
         Nothing is felt any more: the share that is left goes with the way that is left.
@@ -146,16 +186,85 @@ class ForceTracker:
         ----------
         index : float
             Number of a set-point after the stroke's last.
+        t : float
+            s.
 
         Returns
         -------
         array, shape (3,)
             mm.
         """
+        self.supervisor.leaves(t)
         plan, normal = self._plan, self._plan.normal_at(index)
         gone = float((plan.at(index)[0] - plan.position[plan.last]) @ normal) / self._reach
         left: Floats = max(1.0 - gone, 0.0) * self._delta[0] * normal
         return left
+
+    def retreat(self, index: float, t: float) -> Floats:
+        """Return what to add where the plan itself does not leave the work: the tool is lifted.
+
+        Parameters
+        ----------
+        index : float
+            Number of the stroke's last set-point.
+        t : float
+            s.
+        """
+        self._delta = force_coupling.follow(self._filter, self._delta, self.supervisor.retreat(t))
+        return self.hold(index)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a run file says of the contact; empty where nothing was drawn."""
+        supervisor = self.supervisor
+        events = [
+            {"t": round(one.t, 6), "state": one.state, "detail": one.detail}
+            for one in supervisor.events
+        ]
+        found = self.tally.facts(supervisor.policy.contact)
+        if not found:
+            return {"contact_events": events}
+        found |= {"landing_peak": supervisor.landing_peak}
+        for name in ("stiffness", "delay"):
+            if getattr(supervisor, name) is not None:
+                found[name] = getattr(supervisor, name)
+        return {"contact": found, "contact_events": events}
+
+    def gains(self) -> dict[str, float]:
+        """Return the law's gains, once they are known."""
+        known = self.supervisor.gains
+        if known is None:
+            return {}
+        found = {"mass": known.mass, "damping": known.damping}
+        return found if np.isinf(known.integral) else found | {"integral_time": known.integral}
+
+
+def _setpoints(plan: Plan, setpoint: float, override: float | None) -> Floats:
+    """F_d at each set-point of a plan, shape (n,), N; an override leaves lifted parts at 0."""
+    wanted = np.zeros(len(plan))
+    drawn = slice(plan.lead, plan.last + 1)
+    if plan.force is None:
+        wanted[drawn] = setpoint
+    else:
+        own = plan.force[drawn]
+        wanted[drawn] = own if override is None else np.where(own > 0.0, override, 0.0)
+    return wanted
+
+
+def _lead(plan: Plan, policy: ContactPolicy) -> Floats:
+    """Share of the lift at each set-point before the stroke: it grows along the last way to it.
+
+    A way that is too short to be lifted on stays as it is; the tool is lifted where it ends.
+    """
+    shares = np.zeros(plan.lead)
+    first = [at for phase, at in plan.legs if phase == "approach" and at < plan.lead]
+    if not first:
+        return shares
+    count = plan.lead - first[-1]
+    if 1.875 * policy.reach > policy.free * 2.0 * count * plan.period:
+        return shares
+    s = np.arange(1, count + 1) / count
+    shares[first[-1] :] = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    return shares
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 """The pre-flight verdict as a small table."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,20 @@ def table(judged: Sequence[CheckedPlan]) -> str:
     if len(judged) > 1:
         return _of_many(judged)
     return _of_one(judged[0].plan, judged[0].checks)
+
+
+def facts(judged: Sequence[CheckedPlan]) -> dict[str, Any]:
+    """Return the verdict as JSON values: each stroke with all its checks."""
+    strokes = [
+        {
+            "id": one.plan.id,
+            "length_mm": _length(one.plan),
+            "duration_s": (one.plan.last - one.plan.lead) * one.plan.period,
+            "checks": [{"passed": check.passed} | asdict(check) for check in one.checks],
+        }
+        for one in judged
+    ]
+    return {"strokes": strokes}
 
 
 def _of_one(plan: Plan, checks: Sequence[Check]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import EULER_ANGLES, EVENT, JOINTS, POSITION, WRENCH, suffixed
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -33,9 +33,17 @@ class Row:
         Compensated, at the TCP, base axes.
     coupling : float
         e of eq. (10), mm.
+    force : float
+        F_d of eq. (10), N.
+    contact : str
+        State of the contact.
     state, phase : str
     id : str or None
         The stroke that the set-point lies on; None on the way to, from and between strokes.
+    joints : array, shape (n,), or None
+        Actual, rad.
+    event : str
+        Outputs that were switched in this cycle.
     """
 
     t: float
@@ -50,7 +58,13 @@ class Row:
     state: str
     phase: str
     id: str | None = None
+    joints: Floats | None = None
+    event: str = ""
+    force: float = 0.0
+    contact: str = ""
 
+
+CONTACT = "contact"
 
 _TIMES = ("t", "t_plan", "deadline", "lateness")
 _POSES = (("planned", "plan"), ("sent", "sent"), ("actual", ""))
@@ -65,6 +79,10 @@ class RunLog:
         Whether the trajectory states an orientation; without one the planned angles are absent.
     sensed, coupled : bool
         Whether there is a sensor, and a force coupling.
+    joints : int
+        How many joint angles the arm tells; 0 where none.
+    switching : bool
+        Whether outputs are switched.
 
     Attributes
     ----------
@@ -72,13 +90,25 @@ class RunLog:
         ``clock`` is the loop's clock, which no file keeps.
     """
 
-    def __init__(self, oriented: bool = True, sensed: bool = False, coupled: bool = False) -> None:
+    def __init__(
+        self,
+        oriented: bool = True,
+        sensed: bool = False,
+        coupled: bool = False,
+        joints: int = 0,
+        switching: bool = False,
+    ) -> None:
         groups = dict.fromkeys(("clock", *_TIMES), 1)
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
-        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1} if coupled else {})
-        self.rows = RowBuffer(groups, ("state", "phase", "id"))
+        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1, "fn": 1} if coupled else {})
+        self._joints = joints if joints <= len(JOINTS) else 0
+        groups |= {"joints": self._joints} if self._joints else {}
+        texts = [EVENT] if switching else []
+        self._texts = ("state", "phase", "id", *texts, *([CONTACT] if coupled else []))
+        self._switching = switching
+        self.rows = RowBuffer(groups, self._texts)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
     def __len__(self) -> int:
@@ -98,12 +128,15 @@ class RunLog:
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
-            felt += (row.coupling,)
+            felt += (row.coupling, row.force)
+        if self._joints:
+            told = row.joints is not None and len(row.joints) == self._joints
+            felt += (row.joints if told and row.joints is not None else np.nan,)
         times = (row.t, row.t_plan, row.deadline, row.lateness)
-        self.rows.add(
-            (clock, *times, *planned, *row.sent, *row.actual, *felt),
-            (row.state, row.phase, row.id or ""),
-        )
+        words = [row.state, row.phase, row.id or ""]
+        words += [row.event] if self._switching else []
+        words += [row.contact] if self._coupled else []
+        self.rows.add((clock, *times, *planned, *row.sent, *row.actual, *felt), words)
 
     def columns(self) -> dict[str, AnyArray]:
         """Return the columns of the run file, each of shape (rows,)."""
@@ -128,8 +161,16 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out |= _split(rows.numbers("wrench"), WRENCH, "")
     if "coupling" in rows.groups:
         out["coupling"] = rows.numbers("coupling")
+    if "fn" in rows.groups:
+        out["fn"] = rows.numbers("fn")
+    if "joints" in rows.groups:
+        angles = rows.numbers("joints").reshape(len(rows), -1)
+        out |= dict(zip(JOINTS, angles.T, strict=False))
     out |= {name: np.array(rows.words(name), dtype=object) for name in ("state", "phase")}
-    return out | {"id": np.array([word or None for word in rows.words("id")], dtype=object)}
+    for name in ("id", EVENT, CONTACT):
+        if name in rows.texts:
+            out[name] = np.array([word or None for word in rows.words(name)], dtype=object)
+    return out
 
 
 def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict[str, Any]:

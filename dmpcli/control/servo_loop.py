@@ -7,8 +7,10 @@ however late the loop is. Every cycle is logged, the last one too.
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
+from dmpcli.arrays import Floats
 from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import (
     ControlLoop,
@@ -20,11 +22,12 @@ from dmpcli.control.cycle import (
 )
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
 from dmpcli.control.guards import LAG
+from dmpcli.control.outputs import OutputSwitch, failed
 from dmpcli.control.plan_cursor import PlanCursor
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.control.signals import Interruption
 from dmpcli.control.step_limits import StepLimits, check_start
-from dmpcli.errors import DmpError, InputError, RefusedError
+from dmpcli.errors import DmpError, InputError, RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan, Pose
@@ -49,6 +52,8 @@ class PlanLoop(ControlLoop):
         Read once a cycle; what it returns ends the run.
     then : sequence of Plan
         What is drawn after `plan`, each from where the one before it rests.
+    outputs : OutputSwitch, optional
+        What switches outputs along the plans.
 
     Attributes
     ----------
@@ -58,6 +63,8 @@ class PlanLoop(ControlLoop):
         By how much more than its look-ahead the arm may lag at a stroke's end, s.
     plan : Plan
         The one that is drawn.
+    period, duration : float
+        Of its cycles, and of all plans, s.
     drawn : list of str
         Ids of the strokes that were drawn to their ends.
     pressing : ForceTracker or None
@@ -83,11 +90,14 @@ class PlanLoop(ControlLoop):
         touch: ForceInput | None = None,
         hindrance: Callable[[], DmpError | None] = lambda: None,
         then: Sequence[Plan] = (),
+        outputs: OutputSwitch | None = None,
     ) -> None:
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
         self.plan, self._then = plan, deque(then)
+        self.period, self.duration = plan.period, plan.period * sum(map(len, (plan, *then)))
         self.drawn: list[str] = []
+        self._short: dict[str, float] = {}
         self.pressing: ForceTracker | None = touch.pressing if touch else None
         if self.pressing is not None and not self.STREAMS:
             raise InputError(
@@ -95,8 +105,10 @@ class PlanLoop(ControlLoop):
                 "whole plan by itself; leave mode=file out of --robot"
             )
         self._touch, self._limits = touch, limits
+        self._outputs, self._owed, self._switched = outputs, 0, ""
         self._draw(plan)
-        self.log = RunLog(plan.oriented, touch is not None, self.pressing is not None)
+        sensed, pressed = touch is not None, self.pressing is not None
+        self.log = RunLog(plan.oriented, sensed, pressed, arm.joints, outputs is not None)
 
     def run(self, interruption: Interruption) -> LoopOutcome:
         """Go on until the arm rests at the end, or a reason to stop; the arm is stopped after.
@@ -116,7 +128,33 @@ class PlanLoop(ControlLoop):
         how, failure = self._run()
         if self._cursor.braking:
             how = how or "decelerated along the path"
-        return self._outcome(how, failure, DONE)
+        failure = failure or self._untouched()
+        outcome = self._outcome(how, failure, DONE)
+        if self._outputs is None or not self._outputs.left:
+            return outcome
+        reason, failure = failed(outcome.reason, outcome.failure, self._outputs.left)
+        return replace(outcome, reason=reason, failure=failure)
+
+    def _leave(self) -> None:
+        if self._outputs is not None:
+            self._outputs.leave()
+
+    def _untouched(self) -> DmpError | None:
+        """Return why what was drawn does not count, though nothing else went wrong."""
+        pressing = self.pressing
+        if pressing is None or self._interruption.count:
+            return None
+        if pressing.failure:
+            return RefusedError(pressing.failure)
+        if not self._short:
+            return None
+        name, share = next(iter(self._short.items()))
+        least = pressing.supervisor.policy.least_share
+        more = f", and {len(self._short) - 1} more" if len(self._short) > 1 else ""
+        return RefusedError(
+            f"stroke {name} was in contact on {beside(100.0 * share, 100.0 * least, '.1f')} % of "
+            f"it, under {100.0 * least:g} % (--min-contact){more}: it does not count as drawn"
+        )
 
     @property
     def virtual(self) -> bool:
@@ -136,9 +174,21 @@ class PlanLoop(ControlLoop):
             self._advance()
         if self._interruption.count > 1:
             raise StoppedAtOnce("stopped at once at the second signal")
-        if self._interruption.count or self._hindrance() is not None:
+        if self._interruption.count or self._hindrance() is not None or self._lost:
+            self._switched += self._outputs.off() if self._outputs is not None else ""
             self._brake()
-        return self._setpoint(cycle)
+        setpoint = self._setpoint(cycle)
+        if self._outputs is not None and not self._cursor.waiting and not self._cursor.braking:
+            self._owed = self._owed + 1 if owed else 0
+            late = 0.0 if self._arm.info.queues else cycle.late
+            when = cycle.due + late + self._owed * self._period
+            self._outputs.reach(self.plan, self._cursor.index, when)
+        return setpoint
+
+    @property
+    def _lost(self) -> bool:
+        """Whether the force coupling has given up."""
+        return self.pressing is not None and bool(self.pressing.failure)
 
     @abstractmethod
     def _brake(self) -> None:
@@ -151,13 +201,20 @@ class PlanLoop(ControlLoop):
     def _goes_on(self, cycle: Cycle) -> bool:
         """Go on until the last plan has ended, or the brake, and the arm stands still."""
         over = self._cursor.finished and (not self._then or self._cursor.braking)
+        over = over and self._clear()
         self._rested = over and self._rest.reached(cycle.state)
+        if self._outputs is not None and self._outputs.waiting:
+            self._rested = False  # the arm is on its way to where something is switched
         self._look(cycle.state)
         if self._rested:
             if not self._cursor.braking and self._last is not None:
                 self._arrival.check_rest(cycle.state, self._last)
             return False
         self._advance()
+        return True
+
+    def _clear(self) -> bool:
+        """Whether the tool has come off the work as far as it shall."""
         return True
 
     def _advance(self) -> None:
@@ -203,7 +260,11 @@ class PlanLoop(ControlLoop):
             return
         if self._arrival.arrived:
             self._counted = True
-            self.drawn.append(self.plan.id)
+            share = 1.0 if self.pressing is None else self.pressing.tally.share(self.plan.id)
+            if self.pressing and share < self.pressing.supervisor.policy.least_share:
+                self._short[self.plan.id] = share
+            else:
+                self.drawn.append(self.plan.id)
         elif over and self._arrival.looked:
             self._arrival.refuse()
 
@@ -211,6 +272,11 @@ class PlanLoop(ControlLoop):
         index, state = self._cursor.index, cycle.state
         draws = self.plan.draws_at(index)
         actual = (state.position, state.rotation)
+        switched, failure = self._switched, None
+        if self._outputs is not None and setpoint is not None:
+            now, self._switched = self._arm.clock.now() - self._begin, ""
+            done, failure = self._outputs.act(now)
+            switched = "; ".join(part for part in (switched, done) if part)
         self.log.add(
             state.t,
             Row(
@@ -224,11 +290,17 @@ class PlanLoop(ControlLoop):
                 lateness=cycle.late if lateness is None else lateness,
                 wrench=cycle.wrench,
                 coupling=self.pressing.e if self.pressing and draws else 0.0,
+                force=self.pressing.wanted(index) if self.pressing else 0.0,
+                contact=self.pressing.supervisor.state if self.pressing else "",
                 state=state.mode,
                 phase=self._cursor.phase,
                 id=self.plan.id if draws else None,
+                joints=state.joints,
+                event=switched,
             ),
         )
+        if failure is not None:
+            raise failure
 
 
 class ServoLoop(PlanLoop):
@@ -239,16 +311,23 @@ class ServoLoop(PlanLoop):
     def _enter(self) -> None:
         super()._enter()
         self._steps = StepLimits(self._limits, self._period)
+        self._over = 0.0  # s since the last plan ended
 
     def _brake(self) -> None:
         """Decelerate along the path from now on, if any of it is left."""
         if self._then or not self._cursor.finished:
             self._cursor.brake()
 
-    def _check(self, cycle: Cycle) -> None:
-        super()._check(cycle)
-        if self.pressing is not None and self._cursor.waiting and self.pressing.given_up:
-            raise RefusedError(f"{self.pressing.given_up}; check surface and sensor")
+    def _clear(self) -> bool:
+        """Whether a coupled tool is off the work: led by its plan, or lifted where that ends."""
+        pressing, cursor = self.pressing, self._cursor
+        if pressing is None or cursor.braking or self.plan.last < len(self.plan) - 1:
+            return True
+        self._over += self._period
+        beyond = self._over - self._arm.info.lookahead
+        if beyond > -1e-9:
+            self._count(over=beyond > self.PATIENCE)
+        return pressing.supervisor.retreated
 
     def _setpoint(self, cycle: Cycle) -> Pose:
         pressing, cursor = self.pressing, self._cursor
@@ -256,12 +335,24 @@ class ServoLoop(PlanLoop):
             cursor.release()
         index = cursor.index
         position, rotation = self.plan.at(index)
-        if pressing is not None and index > self.plan.last:
-            position = position + pressing.leave(index)
-        elif pressing is not None and index >= self.plan.lead:
-            if cycle.wrench is None or cursor.braking:
-                position = position + pressing.hold(index)
-            else:
-                position = position + pressing.displace(index, cycle.wrench)
+        if pressing is not None:
+            position = position + self._pressed(pressing, cycle, index)
+            if pressing.supervisor.urgent:
+                raise RefusedError(pressing.failure)
         self._steps.check(self._last, position, rotation)
         return position, rotation
+
+    def _pressed(self, pressing: ForceTracker, cycle: Cycle, index: float) -> Floats:
+        """Return what the force coupling adds to the set-point, shape (3,), mm."""
+        plan, cursor, t = self.plan, self._cursor, cycle.due
+        if cursor.braking:
+            return pressing.hold(index)
+        if index > plan.last:
+            return pressing.leave(index, t)
+        if index < plan.lead:
+            return pressing.come(index, cycle.wrench, t)
+        if cursor.finished and self._counted:
+            return pressing.retreat(index, t)
+        if cycle.wrench is None:
+            return pressing.hold(index)
+        return pressing.displace(index, cycle.wrench, t)

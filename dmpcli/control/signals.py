@@ -4,6 +4,7 @@ SIGINT and SIGTERM, and what a terminal sends: SIGQUIT, and SIGHUP when it is cl
 ignored (``nohup``). SIGTSTP (Ctrl-Z) is ignored: a loop that is suspended leaves the arm to itself.
 """
 
+import contextlib
 import signal
 from types import FrameType, TracebackType
 from typing import Any
@@ -31,12 +32,16 @@ class Interruption:
         self.number: int | None = None
         self.count = 0
         self._before: dict[int, Any] = {}
+        self._handlers = contextlib.ExitStack()
 
     def __enter__(self) -> "Interruption":
-        for number in _COUNTED:
-            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-                self._before[number] = signal.signal(number, self.receive)
-        self._before[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        # A stack, since a signal that has not been taken over yet, or not any more, may raise here.
+        with contextlib.ExitStack() as handlers:
+            for number in _COUNTED:
+                if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                    self._take(handlers, number, self.receive)
+            self._take(handlers, signal.SIGTSTP, signal.SIG_IGN)
+            self._handlers = handlers.pop_all()
         return self
 
     def __exit__(
@@ -45,9 +50,12 @@ class Interruption:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        # SIGINT last: its usual handler may raise at once, and none may be left as it was here.
-        for number, handler in reversed(self._before.items()):
-            signal.signal(number, handler)
+        self._handlers.close()
+
+    def _take(self, handlers: contextlib.ExitStack, number: int, handler: Any) -> None:
+        self._before[number] = signal.getsignal(number)
+        handlers.callback(signal.signal, number, self._before[number])
+        signal.signal(number, handler)
 
     def receive(self, number: int, frame: FrameType | None = None) -> None:  # noqa: ARG002
         """Count one signal."""

@@ -81,7 +81,9 @@ AT_REST = StopOutcome("at rest")
 """Of an arm that stands, or was never moved."""
 
 
-def stop(servo: Servo, clock: Clock, watch: bool = True) -> StopOutcome:
+def stop(
+    servo: Servo, clock: Clock, watch: bool = True, then: Callable[[], None] = lambda: None
+) -> StopOutcome:
     """Stop an arm, and watch it until it rests; raises nothing.
 
     Parameters
@@ -90,14 +92,25 @@ def stop(servo: Servo, clock: Clock, watch: bool = True) -> StopOutcome:
     clock : Clock
     watch : bool
         Whether it has to be seen: not one that was never moved, nor one that was seen at rest.
+    then : callable
+        Called as soon as it was told, or could not be; raises nothing.
     """
+    failed = _told(servo)
+    then()
+    if failed is not None:
+        return failed
+    return _seen(servo, clock) if watch else AT_REST
+
+
+def _told(servo: Servo) -> StopOutcome | None:
+    """Tell an arm to stop; None where that went well."""
     try:
         servo.stop()
     except DmpError as failure:
         return StopOutcome("not told", str(failure))
     except Exception as defect:
         return StopOutcome("not told", _words(defect), defect)
-    return _seen(servo, clock) if watch else AT_REST
+    return None
 
 
 def _seen(servo: Servo, clock: Clock) -> StopOutcome:

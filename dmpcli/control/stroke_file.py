@@ -1,7 +1,7 @@
 """The strokes of a trajectory file, or of the folder of a batch, that are to be executed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +60,12 @@ class StrokeSelection:
     def strokes(self) -> list[PlannedStroke]:
         """The strokes alone."""
         return [found.stroke for found in self.found]
+
+
+def without_events(batch: StrokeSelection) -> StrokeSelection:
+    """Return the strokes without the outputs that they switch."""
+    found = tuple(replace(one, stroke=replace(one.stroke, events=())) for one in batch.found)
+    return replace(batch, found=found)
 
 
 def find(path: str | Source, wanted: Sequence[str] = ()) -> StrokeSelection:
@@ -163,5 +169,14 @@ def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -
     if len(rows) < 2:
         raise InputError(f"{source.name}: stroke {name} has one row; a motion needs at least two")
     one = stored(source, name, rows, source.provenance.facts | dict(more))
-    stroke = PlannedStroke(name, one.t, one.position, one.rotation, one.normal, one.first_row)
+    stroke = PlannedStroke(
+        name,
+        one.t,
+        one.position,
+        one.rotation,
+        one.normal,
+        one.first_row,
+        one.events,
+        one.force,
+    )
     return FoundStroke(stroke, one.facts)

@@ -15,7 +15,13 @@ from typing import Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, beside
-from dmpcli.instruments.protocols import DragTeaching, RobotState, Servo, ServoInfo
+from dmpcli.instruments.protocols import (
+    DragTeaching,
+    OutputSwitching,
+    RobotState,
+    Servo,
+    ServoInfo,
+)
 
 LONGEST = 5
 """Periods, or one look-ahead if that is longer, after which the loop counts as hung."""
@@ -54,6 +60,7 @@ class Watchdog:
         self._barked = ""  # why the arm is being stopped, and then how that ended
         self._settled = threading.Event()
         self._lookahead = self._limit = self._seen = 0.0
+        self._outputs: list[str] = []  # that are on
 
     def open(self) -> ServoInfo:
         """Connect."""
@@ -162,6 +169,7 @@ class Watchdog:
         try:
             if free:
                 self._servo.stop()
+                self._switch_off()
             elif not (isinstance(self._servo, Halting) and self._servo.halt()):
                 return "a call of it hangs, and there is no way beside that"
         except Exception as error:  # a defect must not end the watch either
@@ -170,6 +178,30 @@ class Watchdog:
             if free:
                 self._lock.release()
         return ""
+
+    def _switch_off(self) -> None:
+        for name in list(self._outputs):
+            self._servo.switch(name, False)  # type: ignore[attr-defined]
+            self._outputs.remove(name)
+
+
+class _Switches(Watchdog):
+    def check_output(self, name: str) -> None:
+        """Make sure that there is an output of this name."""
+        self._servo.check_output(name)  # type: ignore[attr-defined]
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output; nothing on after the arm was stopped."""
+        if on:
+            self._check()
+        with self._lock:
+            if on and self._barked:
+                return
+            if on and name not in self._outputs:
+                self._outputs.append(name)
+            self._servo.switch(name, on)  # type: ignore[attr-defined]
+            if not on and name in self._outputs:
+                self._outputs.remove(name)
 
 
 class _Drags(Watchdog):
@@ -203,6 +235,8 @@ def watched(servo: Servo) -> Watchdog:
     servo : Servo
     """
     kinds: list[type[Watchdog]] = [_Drags] if isinstance(servo, DragTeaching) else []
+    if isinstance(servo, OutputSwitching):
+        kinds.append(_Switches)
     if all(hasattr(servo, name) for name in ("upload", "play")):
         kinds.append(_Plays)
     made: Watchdog = type("Watchdog", (*kinds, Watchdog), {})(servo)

@@ -101,6 +101,33 @@ def contact_heights(skill: Skill, contact: float | None, offset: float = 0.0) ->
     )
 
 
+def pressed(w: Floats, force: float | None, heights: ContactHeights | None) -> Floats | None:
+    """Set-point of the force along the normal: a force in contact, 0 where the tool is lifted.
+
+    Parameters
+    ----------
+    w : array, shape (T,)
+        Heights as drawn, mm.
+    force : float or None
+        N; None asks for none.
+    heights : ContactHeights or None
+        What was drawn of them over a named surface; without one a pen within `CONTACT` of the
+        stroke's own plane touches.
+
+    Returns
+    -------
+    array, shape (T,), or None
+        N.
+    """
+    if force is None:
+        return None
+    # What is drawn in contact lies exactly on its offset.
+    known = heights is not None and heights.band > 0.0
+    near, offset = (1e-6, heights.offset) if known and heights else (CONTACT, 0.0)
+    found: Floats = np.where(np.abs(w - offset) <= near, force, 0.0)
+    return found
+
+
 def end_heights(skill: Skill, heights: ContactHeights | None) -> tuple[float, float]:
     """Heights w at which the strokes of a skill begin and end, mm."""
     if skill.model == "original":

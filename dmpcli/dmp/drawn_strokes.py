@@ -46,6 +46,8 @@ class GeneralizeOptions:
         Where on the surface no stroke may be.
     on_border : {'fail', 'clip', 'skip', 'split'}
         What becomes of a stroke that leaves the surface, or comes where it may not be.
+    force : float or None
+        With which the tool shall press along the normal where it is in contact, N.
     """
 
     rate: float = 50.0
@@ -62,6 +64,7 @@ class GeneralizeOptions:
     pace: Pace | None = None
     keep_off: KeepOff | None = None
     on_border: OnBorder = "fail"
+    force: float | None = None
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,8 @@ class DrawnStroke:
         Whether it crosses a sharp crease, where a tool cannot follow the surface.
     cuts : tuple of (int, int)
         Of a stroke that is split: where each piece begins, and where what follows it begins.
+    force : array, shape (T,), or None
+        Set-point of the force along the normal, N, 0 where the tool is lifted; None asks for none.
     """
 
     timing: Timing
@@ -97,6 +102,7 @@ class DrawnStroke:
     outside: Booleans
     unfolded: bool
     cuts: tuple[tuple[int, int], ...] = ()
+    force: Floats | None = None
 
     def above(self, goal: Floats, height: float) -> Floats:
         """Return the point (3,) at a height over the goal, along the last normal, mm."""
@@ -127,7 +133,9 @@ class DrawnStroke:
             normal = normal[first:end]
         if len(outside) > 1:
             outside = outside[first:end]
-        return DrawnStroke(t, self.position[first:end], euler, normal, Status.DRAWN, outside, False)
+        force = None if self.force is None else self.force[first:end]
+        made = DrawnStroke(t, self.position[first:end], euler, normal, Status.DRAWN, outside, False)
+        return replace(made, force=force)
 
 
 @dataclass(frozen=True)
@@ -152,6 +160,8 @@ class DrawnBlock:
     unfolded : array of bool, shape (B,)
     cuts : tuple of (int, int)
         Of all its strokes; see `DrawnStroke`.
+    force : array, shape (T,), or None
+        Of all its strokes: w is the same at every pair.
     """
 
     rows: Integers
@@ -163,6 +173,7 @@ class DrawnBlock:
     outside: Booleans
     unfolded: Booleans
     cuts: tuple[tuple[int, int], ...] = ()
+    force: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -178,6 +189,7 @@ class DrawnBlock:
             self.outside[i],
             bool(self.unfolded[i]),
             self.cuts,
+            self.force,
         )
 
     def some(self, of: Integers) -> "DrawnBlock":

@@ -7,7 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.dmp import own_timing
-from dmpcli.dmp.contact_heights import ContactHeights
+from dmpcli.dmp.contact_heights import ContactHeights, pressed
 from dmpcli.dmp.drawn_strokes import DrawnBlock, DrawnStroke, GeneralizeOptions
 from dmpcli.dmp.rollout import Pairs, Trajectories, curves, roll_out
 from dmpcli.dmp.sides import taught_side, turned_over
@@ -136,6 +136,7 @@ def _drawn(
             style.inclination,
         )
     lift, count = drawn.lift, len(pairs)
+    force = pressed(shared[4], style.force, heights)
     if not _finite(drawn):
         raise InputError("the skill's numbers give no finite stroke; fit it again")
     if lift is not None:
@@ -145,7 +146,15 @@ def _drawn(
         if style.keep_off is not None:
             outside, status = style.keep_off.marked(drawn.position, outside, status)
         return DrawnBlock(
-            rows, when, drawn.position, drawn.euler, lift.normal, status, outside, lift.unfolded
+            rows,
+            when,
+            drawn.position,
+            drawn.euler,
+            lift.normal,
+            status,
+            outside,
+            lift.unfolded,
+            force=force,
         )
     flat = surface is None or isinstance(surface, Plane)
     normal = surface.normal if isinstance(surface, Plane) else skill.frame.normal
@@ -159,6 +168,7 @@ def _drawn(
         np.full(count, Status.DRAWN),
         none[:, None],
         none,
+        force=force,
     )
 
 

@@ -10,7 +10,15 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.formats.program_moves import BEGIN, END, NUMBER, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_moves import (
+    BEGIN,
+    END,
+    NUMBER,
+    ProgramMoves,
+    identifier,
+    output_number,
+    spelled,
+)
 from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
@@ -24,6 +32,7 @@ from dmpcli.formats.toolpath import (
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import matrices
 from dmpcli.records.untrusted import decoder
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.wrench import Tool
 
 LONGEST_NAME = 24
@@ -61,9 +70,11 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
         if options.lift:
             body.append(f"LIN {_frame(path.before, angles[0])}")
         body += [f"LIN {poses[0]}", f";{BEGIN} {spelled(path.id)}"]
+        body += [_switch(event) for event in path.switches.get(0, ())]
         for leg in legs(path, options.blend):
+            switched = [_switch(event) for event in path.switches.get(leg.index, ())]
             if leg.pause:
-                body.append(f"WAIT SEC {significant(leg.seconds)}")
+                body += [f"WAIT SEC {significant(leg.seconds)}", *switched]
                 continue
             length = float(path.length[leg.index - 1])
             if leg.speed is None:
@@ -75,9 +86,11 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
                 speed(leg.speed)
             if leg.blend:
                 _set(body, state, "cdis", "$APO.CDIS=", number(leg.blend, 3))
+                # At the move's end, of a rounded one at the middle of its arc.
+                body += [f"TRIGGER WHEN DISTANCE=1 DELAY=0 DO {deed}" for deed in switched]
                 body.append(f"LIN {poses[leg.index]} C_DIS")
             else:
-                body.append(f"LIN {poses[leg.index]}")
+                body += [f"LIN {poses[leg.index]}", *switched]
         body.append(f";{END} {spelled(path.id)}")
         if options.lift:
             turn(_FREE_TURN)
@@ -98,6 +111,10 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
     for i, group in enumerate(groups):
         lines += ["", f"DEF PART_{i + 1} ( )", *(body[k] for k in group), "END"]
     return ("\n".join([*lines, ""])).encode()
+
+
+def _switch(event: OutputEvent) -> str:
+    return f"$OUT[{output_number(event.output, 'DO', 'KRL')}]={str(event.on).upper()}"
 
 
 def _set(body: list[str], state: dict[str, str], key: str, words: str, text: str) -> None:
@@ -143,6 +160,11 @@ _IS_ROOT = re.compile(
     r"\$ROBROOT|\$NULLFRAME|\{\s*[XYZABC]\s+0(\.0*)?(\s*,\s*[XYZABC]\s+0(\.0*)?)*\s*\}|0",
     re.ASCII | re.IGNORECASE,
 )
+_OUT = re.compile(
+    r"(?:TRIGGER\s+WHEN\s+DISTANCE\s*=\s*([01])\s+DELAY\s*=\s*0\s+DO\s+)?"
+    r"\$OUT\s*\[\s*(\d{1,4})\s*\]\s*=\s*(TRUE|FALSE)",
+    re.ASCII | re.IGNORECASE,
+)
 _HARMLESS = re.compile(
     r"(&.*|END|BAS\s*\(.*\)|PTP\s+\$AXIS_ACT|"
     r"PTP\s+\$POS_ACT|\$[\w.\[\]]+\s*=.*|(DECL|INT|REAL|BOOL)\s.*)",
@@ -174,7 +196,10 @@ def decode(source: Source) -> list[MotionStroke]:
         elif base and not _IS_ROOT.fullmatch(base[1] or base[2]):
             moves.in_frame(line, f"$BASE {base[1] or base[2]}")
         value, wait, found = _VALUE.fullmatch(code), _WAIT.fullmatch(code), _LIN.fullmatch(code)
-        if value:
+        if switched := _OUT.fullmatch(code):
+            ahead = int(switched[1] or 0)
+            moves.switch(f"DO{int(switched[2])}", switched[3].upper() == "TRUE", ahead)
+        elif value:
             if value[1].upper() == "CP":
                 speed = float(value[2]) * 1000.0
             else:

@@ -1,7 +1,8 @@
 """LeRobot datasets, version 3: Parquet of float32 on an even grid, one episode per stroke.
 
 ``observation.state`` holds x, y, z in m and, where the tool's orientation is known, its quaternion
-x, y, z, w; ``action`` is the state that comes next. A wrench stands in ``observation.wrench``.
+x, y, z, w; ``action`` is the state that comes next. A wrench stands in ``observation.wrench``,
+joint angles in rad in ``observation.joints``, each where every stroke has them.
 Layout: LeRobotDataset v3.0 (huggingface.co/docs/lerobot), codebase_version ``v3.0``.
 """
 
@@ -19,6 +20,7 @@ from dmpcli.arrays import AnyArray, Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import Motion, MotionStroke
 from dmpcli.records import untrusted
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 
@@ -27,6 +29,7 @@ _DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _PLACE, _TURN = ["x_m", "y_m", "z_m"], ["qx", "qy", "qz", "qw"]
 _FELT = ["fx_N", "fy_N", "fz_N", "tx_Nm", "ty_Nm", "tz_Nm"]
 _STATE, _ACTION, _WRENCH = "observation.state", "action", "observation.wrench"
+_JOINTS = "observation.joints"
 _QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 
@@ -85,6 +88,9 @@ def _columns(motion: Motion, one: MotionStroke) -> dict[str, AnyArray]:
     found = {_STATE: state, _ACTION: np.concatenate([state[1:], state[-1:]])}
     if all(stroke.wrench is not None for stroke in motion.strokes):
         found[_WRENCH] = np.asarray(one.wrench, dtype=np.float32)
+    widths = {0 if stroke.joints is None else stroke.joints.shape[1] for stroke in motion.strokes}
+    if len(widths) == 1 and 0 not in widths:
+        found[_JOINTS] = np.asarray(one.joints, dtype=np.float32)
     return found
 
 
@@ -191,6 +197,8 @@ def _info(columns: dict[str, AnyArray], lengths: list[int], fps: int) -> dict[st
     }
     if _WRENCH in features:
         features[_WRENCH]["names"] = _FELT
+    if _JOINTS in features:
+        features[_JOINTS]["names"] = [f"q{i + 1}_rad" for i in range(columns[_JOINTS].shape[1])]
     features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
     for name in ("frame_index", "episode_index", "index", "task_index"):
         features[name] = {"dtype": "int64", "shape": [1], "names": None}
@@ -229,19 +237,32 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     InputError
         Damaged, of another state, or with several episodes and none chosen.
     """
+    with untrusted.decoding(str(folder)):
+        return _read(folder, episode)
+
+
+def _read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
     names, episodes = _described(folder)
     number = _number(folder, episode, episodes)
     files = sorted((folder / "data").rglob("*.parquet"))
     if not files:
         raise InputError(f"{folder}: has no data/*.parquet; the dataset is not whole")
-    wrench = _WRENCH in pq.read_schema(files[0]).names if _readable(files[0]) else False
-    wanted = [_STATE, "timestamp", "episode_index", *([_WRENCH] if wrench else [])]
+    there = pq.read_schema(files[0]).names if _readable(files[0]) else []
+    more = [name for name in (_WRENCH, _JOINTS) if name in there]
+    wanted = [_STATE, "timestamp", "episode_index", *more]
     parts = [part for file in files if (part := _part(file, number, wanted)) is not None]
     if not parts:
         raise InputError(f"{folder}: holds no samples of episode {number}")
-    state, t = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-    if len(t) < 2 or not np.isfinite(state).all() or not np.isfinite(t).all():
-        raise InputError(f"{folder}: episode {number} holds a value that is not finite, or nothing")
+    known = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    state, t = known[_STATE], known["timestamp"]
+    _check_width(folder, _STATE, state, len(names))
+    if _WRENCH in known:
+        _check_width(folder, _WRENCH, known[_WRENCH], len(_FELT))
+    if len(t) < 2 or not all((np.abs(each) <= LARGEST).all() for each in known.values()):
+        raise InputError(
+            f"{folder}: episode {number} holds a value that is not a number or beyond "
+            f"{LARGEST:g}, or nothing"
+        )
     if (np.diff(t) <= 0.0).any():
         raise InputError(f"{folder}: episode {number}: its time does not increase")
     place = [names.index(name) for name in _PLACE]
@@ -253,8 +274,17 @@ def read(folder: Path, episode: str | None) -> tuple[MotionStroke, list[str]]:
         if bad is not None:
             raise InputError(f"{folder}: episode {number}, frame {bad[0]}: {bad[1]}")
         R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    felt = np.concatenate([part[2] for part in parts]) if wrench else None
-    return MotionStroke(t, state[:, place] * 1000.0, R, id=str(number), wrench=felt), told
+    felt, joints = known.get(_WRENCH), known.get(_JOINTS)
+    position = state[:, place] * 1000.0
+    return MotionStroke(t, position, R, id=str(number), wrench=felt, joints=joints), told
+
+
+def _check_width(folder: Path, name: str, values: Floats, width: int) -> None:
+    if values.shape[1] != width:
+        raise InputError(
+            f"{folder}: {name} holds {values.shape[1]} numbers a sample, {width} are described; "
+            "the dataset is damaged"
+        )
 
 
 def _described(folder: Path) -> tuple[list[str], int]:
@@ -263,7 +293,15 @@ def _described(folder: Path) -> tuple[list[str], int]:
         info = json.loads((folder / INFO).read_text(encoding="utf-8"))
         version, state = str(info["codebase_version"]), info["features"][_STATE]
         names, episodes = state.get("names"), int(info["total_episodes"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (
+        OSError,
+        ArithmeticError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):
         raise InputError(f"{folder}: {INFO} is missing or damaged; no LeRobot dataset") from None
     if isinstance(names, dict) and len(names) == 1:
         [names] = names.values()
@@ -299,16 +337,16 @@ def _readable(file: Path) -> bool:
     return True
 
 
-def _part(file: Path, number: int, wanted: list[str]) -> tuple[Floats, Floats, Floats] | None:
-    """State, time and wrench of an episode in one file; None where it holds none of it."""
+def _part(file: Path, number: int, wanted: list[str]) -> dict[str, Floats] | None:
+    """Columns of an episode in one file, but for its number; None where it holds none of it."""
     with untrusted.decoding(str(file)):
         table = pq.read_table(file, columns=wanted, filters=[("episode_index", "=", number)])
         if not len(table):
             return None
-        found = []
-        for name in (_STATE, wanted[-1] if wanted[-1] == _WRENCH else _STATE):
-            column = table.column(name).combine_chunks()
-            flat = np.asarray(column.flatten(), dtype=float)
-            found.append(flat.reshape(len(table), -1))
-        t = np.asarray(table.column("timestamp"), dtype=float)
-    return found[0], t, found[1]
+        found = {"timestamp": np.asarray(table.column("timestamp"), dtype=float)}
+        for name in wanted:
+            if name.startswith("observation."):
+                column = table.column(name).combine_chunks()
+                flat = np.asarray(column.flatten(), dtype=float)
+                found[name] = flat.reshape(len(table), -1)
+    return found

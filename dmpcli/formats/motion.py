@@ -7,6 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.trajectory import Trajectory
 
 
@@ -21,11 +22,14 @@ class MotionStroke(Trajectory):
         On the tool, at the TCP, base axes, N and N·m.
     joints : array, shape (T, J), or None
         rad.
+    events : tuple of OutputEvent
+        What is switched along it.
     """
 
     id: str = "1"
     wrench: Floats | None = None
     joints: Floats | None = None
+    events: tuple[OutputEvent, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.formats.motion import MotionStroke
 from dmpcli.messages import warn
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import log
 
 Poses = Callable[[Floats], tuple[Floats, Floats | None]]
@@ -44,6 +46,8 @@ class ProgramMoves:
         mm/s, rad/s and s; NaN where it is not said.
     marks : list of (int, str or None)
         Before which move a stroke begins, or None: ends.
+    switches : list of (int, str, bool)
+        After which move an output is switched, which, and whether on.
     frame : (int, str) or None
         The first line that names another frame than the robot's base, and the frame.
     """
@@ -55,6 +59,7 @@ class ProgramMoves:
     turn: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     marks: list[tuple[int, str | None]] = field(default_factory=list)
+    switches: list[tuple[int, str, bool]] = field(default_factory=list)
     frame: tuple[int, str] | None = None
 
     def statements(self, source: Source, comment: str) -> Iterator[tuple[int, str]]:
@@ -95,12 +100,14 @@ class ProgramMoves:
         Raises
         ------
         InputError
-            A number is not finite, a speed not above 0, or a time below 0.
+            A number is beyond what any quantity is, a speed not above 0, or a time below 0.
         """
-        if not all(map(math.isfinite, target)):
-            raise self.wrong(line, "a coordinate is not a finite number")
-        if speed <= 0.0 or turn <= 0.0 or seconds < 0.0 or math.inf in (speed, turn, seconds):
+        if not all(abs(value) <= LARGEST for value in target):
+            raise self.wrong(line, f"a coordinate is not a number, or beyond {LARGEST:g}")
+        if speed <= 0.0 or turn <= 0.0 or seconds < 0.0:
             raise self.wrong(line, "a speed must be above 0, a time at least 0")
+        if not _reasonable(speed) or not _reasonable(turn) or seconds > LARGEST:
+            raise self.wrong(line, f"a speed or time is beyond {LARGEST:g}, or as small")
         self.targets.append(target)
         self.lines.append(line)
         self.speed.append(speed)
@@ -111,6 +118,10 @@ class ProgramMoves:
         """Take a pause; before the first move it is none of a stroke."""
         if self.targets:
             self.move(line, self.targets[-1], seconds=seconds)
+
+    def switch(self, output: str, on: bool, ahead: int = 0) -> None:
+        """Take an output that is switched where the last move has led, or one that is to come."""
+        self.switches.append((len(self.targets) - 1 + ahead, output, on))
 
     def mark(self, comment: str) -> None:
         """Take what a comment says, if it is one of ours."""
@@ -150,7 +161,13 @@ class ProgramMoves:
                 continue
             rows = np.arange(first, last + 1)[kept]
             R = None if rotation is None else rotation[rows]
-            stroke = MotionStroke(t[kept], position[rows], R, id=name or str(number + 1))
+            events = tuple(
+                OutputEvent(float(t[at - first]), output, on)
+                for at, output, on in self.switches
+                if first <= at <= last
+            )
+            name = name or str(number + 1)
+            stroke = MotionStroke(t[kept], position[rows], R, id=name, events=events)
             found.append(stroke)
         if not found:
             raise InputError(f"{self.name}: holds no moves that could be a stroke")
@@ -190,6 +207,11 @@ class ProgramMoves:
         return spans
 
 
+def _reasonable(rate: float) -> bool:
+    """Tell a rate that can be divided by, or one that is not said: NaN."""
+    return not abs(math.log10(rate)) > math.log10(LARGEST)
+
+
 _MARK = re.compile(r"(stroke|end of stroke) (.{0,200})")
 
 
@@ -213,6 +235,20 @@ def lines_of(source: Source) -> list[str]:
 def spelled(name: str) -> str:
     """Return a stroke's name as a comment may hold it."""
     return re.sub(r"[^\w.+\-]+", "_", name) or "_"
+
+
+def output_number(name: str, letters: str, form: str) -> int:
+    """Return the number of an output that a language names by number.
+
+    Raises
+    ------
+    InputError
+        Its name is not those letters and a number.
+    """
+    found = re.fullmatch(rf"{letters}(\d{{1,4}})", name, re.ASCII)
+    if found is None:
+        raise InputError(f"output {name}: {form} numbers its outputs; call it {letters}1 or so")
+    return int(found[1])
 
 
 def identifier(name: str, most: int) -> str:

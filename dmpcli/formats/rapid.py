@@ -6,6 +6,7 @@ Instructions, Functions and Data types, ABB.
 """
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
     GRAVITY,
+    ProgramLeg,
     ProgramOptions,
     centre_on_flange,
     legs,
@@ -25,6 +27,7 @@ from dmpcli.formats.toolpath import (
 from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.records.untrusted import decoder
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 from dmpcli.spatial.wrench import Tool
 
@@ -52,15 +55,23 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
             body.append(f"MoveL {_target(path.before, q[0])}, {travel}, fine, {tail}")
         body.append(f"MoveL {targets[0]}, {travel}, fine, {tail}")
         body.append(f"! {BEGIN} {spelled(path.id)}")
+        body += [_set(event) for event in path.switches.get(0, ())]
         for leg in legs(path, options.blend):
+            switches = path.switches.get(leg.index, [])
             if leg.pause:
-                body.append(f"WaitTime {significant(leg.seconds)};")
+                body += [f"WaitTime {significant(leg.seconds)};", *map(_set, switches)]
                 continue
+            if len(switches) == 1 and leg.blend:
+                body.append(_flying(targets[leg.index], leg, switches[0]))
+                continue
+            if switches:  # more than one: only where the arm stops they come one by one
+                leg = replace(leg, blend=0.0)
             how = rf"v1000\T:={significant(leg.seconds)}"
             if leg.speed is not None:
                 how = rf"v1000\V:={significant(leg.speed)}"
             zone = rf"z1\Z:={number(leg.blend, 3)}" if leg.blend else "fine"
             body.append(f"MoveL {targets[leg.index]}, {how}, {zone}, {tail}")
+            body += map(_set, switches)
         body.append(f"! {END} {spelled(path.id)}")
         if options.lift:
             body.append(f"MoveL {_target(path.after, q[-1])}, {travel}, fine, {tail}")
@@ -73,6 +84,25 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
     for i, group in enumerate(groups):
         lines += ["", f"  PROC Part_{i + 1}()", *(f"    {body[k]}" for k in group), "  ENDPROC"]
     return ("\n".join([*lines, "ENDMODULE", ""])).encode()
+
+
+def _set(event: OutputEvent) -> str:
+    return f"SetDO {event.output}, {int(event.on)};"
+
+
+def _flying(target: str, leg: ProgramLeg, event: OutputEvent) -> str:
+    r"""Return a move that switches an output in the middle of its rounded corner.
+
+    MoveLDO knows neither \V nor \Z: speed and zone stand as data.
+    """
+    r = number(leg.blend, 3)
+    speed = rf"v1000\T:={significant(leg.seconds)}"
+    if leg.speed is not None:
+        speed = f"[{significant(leg.speed)},500,5000,1000]"
+    zone = f"[FALSE,{r},{r},{r},1,{r},1]"
+    return (
+        rf"MoveLDO {target}, {speed}, {zone}, tStroke\WObj:=wobj0, {event.output}, {int(event.on)};"
+    )
 
 
 def _target(position: Floats, q: Floats) -> str:
@@ -106,6 +136,10 @@ _MOVE = re.compile(
     rf"(?:v({_N}|max)|\[\s*({_N})[^\]]*\])\s*(?:\\([VT])\s*:=\s*({_N}))?\s*,[^;]*;",
     re.ASCII | re.IGNORECASE,
 )
+_FLYING = re.compile(r"MoveLDO(\s.*),\s*(\w+)\s*,\s*([01])\s*;", re.ASCII | re.IGNORECASE)
+_OUT = re.compile(
+    r"(?:SetDO\s+(\w+)\s*,\s*([01])|(Set|Reset)\s+(\w+))\s*;", re.ASCII | re.IGNORECASE
+)
 _WAIT = re.compile(rf"WaitTime\s+({_N})\s*;", re.ASCII | re.IGNORECASE)
 _PROC = re.compile(r"(?:LOCAL\s+)?PROC\s+(\w+)\s*\(\s*\)", re.ASCII | re.IGNORECASE)
 _CALL = re.compile(r"(\w+)\s*;", re.ASCII)
@@ -138,6 +172,13 @@ def decode(source: Source) -> list[MotionStroke]:
         elif called:
             routines.call(line, called[1])
         wait, found = _WAIT.fullmatch(code), None
+        if flying := _FLYING.fullmatch(code):
+            code = f"MoveL{flying[1]};"
+            moves.switch(flying[2], flying[3] == "1", ahead=1)
+        if switched := _OUT.fullmatch(code):
+            on = switched[2] == "1" if switched[1] else switched[3].lower() == "set"
+            moves.switch(switched[1] or switched[4], on)
+            continue
         if code[:5].lower() == "movel":
             found = _MOVE.fullmatch(code)
         if wait:

@@ -20,6 +20,8 @@ class FileFormat:
     program : bool
         Whether it moves a machine: then speed, blend, lift and tool count.
     folder : bool
+    outputs : bool
+        Whether it holds what is switched along a stroke.
     """
 
     word: str
@@ -27,6 +29,7 @@ class FileFormat:
     meaning: str
     program: bool = False
     folder: bool = False
+    outputs: bool = False
 
 
 FORMATS = {
@@ -38,9 +41,11 @@ FORMATS = {
         FileFormat("ply", (".ply",), "polyline of vertices and edges"),
         FileFormat("obj", (".obj",), "polyline of vertices and lines"),
         FileFormat("gcode", (".gcode", ".ngc", ".nc"), "G-code in mm, XYZ alone", program=True),
-        FileFormat("urscript", (".script", ".urscript"), "Universal Robots program", program=True),
-        FileFormat("krl", (".src",), "KUKA program", program=True),
-        FileFormat("rapid", (".mod", ".modx"), "ABB program", program=True),
+        FileFormat(
+            "urscript", (".script", ".urscript"), "Universal Robots program", True, outputs=True
+        ),
+        FileFormat("krl", (".src",), "KUKA program", True, outputs=True),
+        FileFormat("rapid", (".mod", ".modx"), "ABB program", True, outputs=True),
         FileFormat("mcap", (".mcap",), "MCAP of ROS 2 messages"),
         FileFormat("ros2", (), "ROS 2 bag, a folder", folder=True),
         FileFormat("lerobot", (), "LeRobot v3 dataset, a folder", folder=True),

@@ -4,6 +4,8 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
+
 from dmpcli import extras
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
@@ -13,6 +15,10 @@ from dmpcli.formats.ros_messages import MessageReader
 from dmpcli.records import untrusted
 
 METADATA = "metadata.yaml"
+
+LARGEST, DEEPEST = 1 << 20, 100
+"""Bytes of the metadata, and brackets within brackets: the time of their reader grows faster."""
+_OPENING, _CLOSING = (np.frombuffer(signs, dtype=np.uint8) for signs in (b"[{", b"]}"))
 
 
 def write(motion: Motion, folder: Path) -> None:
@@ -71,8 +77,27 @@ def read(folder: Path, body: str | None = None) -> tuple[MotionStroke, list[str]
     (rosbag2,) = extras.load(ROS, name, "rosbags.rosbag2")
     store = ros_messages.typestore(name)
     found = MessageReader(name, body)
+    _judge(folder)
     with untrusted.decoding(name), rosbag2.Reader(folder) as reader:
         wanted = [one for one in reader.connections if one.msgtype in ros_messages.READ]
         for one, _, content in reader.messages(connections=wanted) if wanted else ():
             found.take(one.topic, one.msgtype, store.deserialize_cdr(content, one.msgtype))
     return found.stroke()
+
+
+def _judge(folder: Path) -> None:
+    """Refuse metadata that its reader would take minutes for.
+
+    Raises
+    ------
+    InputError
+    """
+    metadata = folder / METADATA
+    try:
+        untrusted.judge_size(str(metadata), metadata.stat().st_size, LARGEST, "a bag's metadata")
+        text = np.frombuffer(metadata.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{metadata}: cannot be read: {error.strerror}") from None
+    depth = np.cumsum(np.isin(text, _OPENING) * 1 - np.isin(text, _CLOSING) * 1)
+    if depth.max(initial=0) > DEEPEST:
+        raise InputError(f"{metadata}: is nested too deep; make the bag again")

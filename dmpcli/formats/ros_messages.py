@@ -4,6 +4,7 @@ PoseStamped, WrenchStamped and a Path leave; PoseStamped, PoseWithCovarianceStam
 TransformStamped, TFMessage and WrenchStamped come in. Quaternions are x, y, z, w.
 """
 
+import functools
 import re
 from array import array
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.records.columns import LARGEST
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 
@@ -53,6 +55,11 @@ def typestore(option: str, ros1: bool = False) -> Any:
         The extra is not installed.
     """
     (typesys,) = extras.load(ROS, option, "rosbags.typesys")
+    return _typestore(typesys, ros1)
+
+
+@functools.cache  # to make one, its types are compiled
+def _typestore(typesys: Any, ros1: bool) -> Any:
     stores = typesys.Stores
     return typesys.get_typestore(stores.ROS1_NOETIC if ros1 else stores.ROS2_HUMBLE)
 
@@ -237,10 +244,13 @@ class MessageReader:
     def _check(self, name: str, stamps: Any, values: Floats) -> None:
         if len(stamps) < 2:
             raise InputError(f"{self._name}: topic {name!r} holds {len(stamps)} pose, no stroke")
-        bad = ~np.isfinite(values).all(axis=1)
+        bad = ~(np.abs(values) <= LARGEST).all(axis=1)
         if bad.any():
             row = int(np.argmax(bad)) + 1
-            raise InputError(f"{self._name}: topic {name!r}, message {row}: is not finite")
+            raise InputError(
+                f"{self._name}: topic {name!r}, message {row}: holds a value that is not a number, "
+                f"or beyond {LARGEST:g}"
+            )
         fault = wrong("quaternion", values[:, 3:])
         if fault is not None:
             raise InputError(f"{self._name}: topic {name!r}, message {fault[0] + 1}: {fault[1]}")
@@ -254,7 +264,7 @@ class MessageReader:
                     f"wrench of {name!r} is not read: its frame is {series.frame!r}, not {frame!r}"
                 )
                 continue
-            if len(own) < 2 or not np.isfinite(values).all() or (np.diff(own) < 0).any():
+            if len(own) < 2 or not (np.abs(values) <= LARGEST).all() or (np.diff(own) < 0).any():
                 continue
             if own[0] > stamps[0] or own[-1] < stamps[-1]:
                 told.append(

@@ -26,6 +26,12 @@ PIXEL = 25.4 / 96.0
 LARGEST = 32 << 20
 """Bytes of a drawing."""
 MOST_POINTS = 2_000_000
+FARTHEST = 1e9
+"""Pixels, which are more than 100 m in any unit."""
+
+MOST_DIGITS = 64
+"""Of a number: what the library takes for one grows with their third power."""
+_LONG = re.compile(rb"[0-9]{%d}" % (MOST_DIGITS + 1))
 
 _SHARP = np.radians(10.0)
 """A turn of more than this is a corner, which a sample hits."""
@@ -69,6 +75,13 @@ def decode(
     """
     if len(source.content) > LARGEST:
         raise InputError(f"{source.name}: is larger than {LARGEST >> 20} MiB; simplify the drawing")
+    long = _LONG.search(source.content)
+    if long is not None:
+        line = source.content.count(b"\n", 0, long.start()) + 1
+        raise InputError(
+            f"{source.name}: line {line}: a number of more than {MOST_DIGITS} digits; export the "
+            "drawing again"
+        )
     (svgelements,) = extras.load(SVG, source.name, "svgelements")
     drawing = _parsed(svgelements, source)
     sized = _has_size(source.content)
@@ -126,7 +139,8 @@ def _height(drawing: Any, points: Floats) -> float:
 def _lines(svgelements: Any, drawing: Any, name: str, tolerance: float) -> tuple[list[Floats], int]:
     """Polylines of all paths, pixels, y down; and how many texts are not among them."""
     lines, hidden, count = [], 0, 0
-    with untrusted.decoding(name):
+    # Numbers without bounds overflow within the library; what comes of them is looked at after.
+    with untrusted.decoding(name), np.errstate(all="ignore"):
         for element in drawing.elements():
             values = getattr(element, "values", None) or {}
             if values.get("visibility") == "hidden" or values.get("display") == "none":
@@ -137,6 +151,8 @@ def _lines(svgelements: Any, drawing: Any, name: str, tolerance: float) -> tuple
                 continue
             for part in svgelements.Path(element).as_subpaths():
                 line = _polyline(svgelements, svgelements.Path(part), tolerance)
+                if not (np.abs(line) <= FARTHEST).all():
+                    raise InputError(f"{name}: a path runs beyond 100 m; check its units")
                 count += len(line)
                 if count > MOST_POINTS:
                     raise InputError(f"{name}: is too long; give a coarser --tolerance")
@@ -154,7 +170,7 @@ def _polyline(svgelements: Any, path: Any, tolerance: float) -> Floats:
         else:
             points += _curve(segment, tolerance)[1:].tolist()
     found = np.array(points, dtype=float).reshape(-1, 2)
-    if not len(found):
+    if not len(found) or not np.isfinite(found).all():
         return found
     step = np.linalg.norm(np.diff(found, axis=0), axis=1)
     return np.asarray(found[np.concatenate([[True], step > 1e-9])])
@@ -165,7 +181,7 @@ def _curve(segment: Any, tolerance: float) -> Floats:
     count = 8
     while True:
         share = np.linspace(0.0, 1.0, 2 * count + 1)
-        points = np.array([(p.x, p.y) for p in map(segment.point, share.tolist())])
+        points = np.asarray(segment.npoint(share), dtype=float)
         off = points[1::2] - (points[:-1:2] + points[2::2]) / 2.0
         if count >= 4096 or not np.linalg.norm(off, axis=1).max() > tolerance:
             return points

@@ -4,18 +4,23 @@ Between two kept samples the machine moves in a straight line and evenly; what i
 within a tolerance of where the line is at the same time, so that the speed is kept with the path.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.spatial.rotations import exp, log
+from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.rotations import exp, interpolate, log
 from dmpcli.spatial.wrench import Tool
 
 STANDS, TURNS = 1e-6, 1e-8
 """A leg shorter than this, mm, that turns by less than this, rad, is a pause."""
+
+_SAME_TIME = 1e-6
+"""Something that is switched within so many seconds of a sample is switched at it."""
 
 TURN_ALONE = 0.2
 """A leg that turns by more than this, rad/mm, is timed: its speed in mm/s means little."""
@@ -77,6 +82,8 @@ class Toolpath:
     rotation : array, shape (n, 3, 3), or None
     before, after : array, shape (3,)
         Where the tool comes from and goes to, mm.
+    switches : dict of list
+        What is switched at a sample, by its number, in order.
     """
 
     id: str
@@ -85,6 +92,7 @@ class Toolpath:
     rotation: Floats | None
     before: Floats
     after: Floats
+    switches: dict[int, list[OutputEvent]] = field(default_factory=dict)
 
     @property
     def seconds(self) -> Floats:
@@ -153,13 +161,40 @@ def legs(path: Toolpath, blend: float) -> Iterator[ProgramLeg]:
 def toolpaths(motion: Motion, options: ProgramOptions, digits: int) -> list[Toolpath]:
     """Return the strokes of a motion as moves, with positions of so many digits after the point."""
     paths = []
-    for one in motion.strokes:
-        kept = thinned(one, options.tolerance)
+    for stroke in motion.strokes:
+        one, corners = with_places(stroke)
+        kept = thinned(one, options.tolerance, [row for row, _ in corners])
         position = np.round(one.position[kept], digits) + 0.0
         rotation = None if one.rotation is None else np.asarray(one.rotation)[kept]
         ends = [position[i] + options.lift * _off(one, i) for i in (0, -1)]
-        paths.append(Toolpath(one.id, one.t[kept], position, rotation, ends[0], ends[1]))
+        switches: dict[int, list[OutputEvent]] = {}
+        for row, event in corners:
+            switches.setdefault(int(np.searchsorted(kept, row)), []).append(event)
+        before, after = ends
+        path = Toolpath(one.id, one.t[kept], position, rotation, before, after, switches)
+        paths.append(path)
     return paths
+
+
+def with_places(one: MotionStroke) -> tuple[MotionStroke, list[tuple[int, OutputEvent]]]:
+    """Return a stroke that has a sample wherever something is switched, and which sample it is."""
+    places = np.clip([event.t for event in one.events], one.t[0], one.t[-1])
+    near = np.abs(one.t[:, None] - places).min(axis=0, initial=np.inf) < _SAME_TIME
+    new = np.unique(places[~near])
+    if len(new):
+        t = np.sort(np.concatenate([one.t, new]))
+        rotation, normal = one.rotation, one.normal
+        if normal is not None and len(normal) > 1:
+            normal = normal[np.clip(np.searchsorted(one.t, t), 0, len(one) - 1)]
+        one = replace(
+            one,
+            t=t,
+            position=np.column_stack([np.interp(t, one.t, axis) for axis in one.position.T]),
+            rotation=None if rotation is None else interpolate(one.t, np.asarray(rotation), t),
+            normal=normal,
+        )
+    rows = [int(np.abs(one.t - place).argmin()) for place in places]
+    return one, list(zip(rows, one.events, strict=True))
 
 
 def _off(one: MotionStroke, i: int) -> Floats:
@@ -171,7 +206,7 @@ def _off(one: MotionStroke, i: int) -> Floats:
     return np.array([0.0, 0.0, 1.0])
 
 
-def thinned(one: MotionStroke, tolerance: float) -> Integers:
+def thinned(one: MotionStroke, tolerance: float, corners: Sequence[int] = ()) -> Integers:
     """Return which samples stay, first and last among them.
 
     Douglas and Peucker's way, with the distance to where the straight motion is at the same time.
@@ -182,14 +217,16 @@ def thinned(one: MotionStroke, tolerance: float) -> Integers:
     one : MotionStroke
     tolerance : float
         mm.
+    corners : sequence of int
+        Samples that stay too.
     """
     n = len(one)
     if tolerance <= 0.0 or n < 3:
         return np.arange(n)
     R = None if one.rotation is None else np.asarray(one.rotation)
     keep = np.zeros(n, dtype=bool)
-    keep[[0, -1]] = True
-    waiting = [(0, n - 1)]
+    keep[[0, -1, *corners]] = True
+    waiting = list(pairwise(np.flatnonzero(keep).tolist()))
     while waiting:
         first, last = waiting.pop()
         if last - first < 2:

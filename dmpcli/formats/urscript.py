@@ -10,7 +10,15 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.formats.program_moves import BEGIN, END, NUMBER, ProgramMoves, identifier, spelled
+from dmpcli.formats.program_moves import (
+    BEGIN,
+    END,
+    NUMBER,
+    ProgramMoves,
+    identifier,
+    output_number,
+    spelled,
+)
 from dmpcli.formats.program_routines import Routines
 from dmpcli.formats.text import number, significant
 from dmpcli.formats.toolpath import (
@@ -23,6 +31,7 @@ from dmpcli.formats.toolpath import (
 )
 from dmpcli.records.file_io import Source
 from dmpcli.records.untrusted import decoder
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import exp, log
 from dmpcli.spatial.wrench import Tool
 
@@ -53,15 +62,17 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
         if options.lift:
             body.append(f"movel({above[0]}, {travel})")
         body += [f"movel({poses[0]}, {travel})", f"# {BEGIN} {spelled(path.id)}"]
+        body += [_switch(event) for event in path.switches.get(0, ())]
         for leg in legs(path, options.blend):
             if leg.pause:
                 body.append(f"sleep({significant(leg.seconds)})")
-                continue
-            how = f"t={significant(leg.seconds)}"
-            if leg.speed is not None:
-                how = f"v={significant(leg.speed / 1000.0)}"
-            blend = f", r={number(leg.blend / 1000.0, 6)}" if leg.blend else ""
-            body.append(f"movel({poses[leg.index]}, a={a}, {how}{blend})")
+            else:
+                how = f"t={significant(leg.seconds)}"
+                if leg.speed is not None:
+                    how = f"v={significant(leg.speed / 1000.0)}"
+                blend = f", r={number(leg.blend / 1000.0, 6)}" if leg.blend else ""
+                body.append(f"movel({poses[leg.index]}, a={a}, {how}{blend})")
+            body += [_switch(event) for event in path.switches.get(leg.index, ())]
         body.append(f"# {END} {spelled(path.id)}")
         if options.lift:
             body.append(f"movel({above[1]}, {travel})")
@@ -79,6 +90,16 @@ def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
 def _joined(row: Floats) -> str:
     position, vector = row[:3].tolist(), row[3:].tolist()
     return ", ".join([*(number(v, 7) for v in position), *(number(v, 8) for v in vector)])
+
+
+_OUTPUTS = {"DO": "standard", "CO": "configurable", "TO": "tool"}
+"""Kinds of outputs, by the letters that their names begin with."""
+
+
+def _switch(event: OutputEvent) -> str:
+    letters = event.output[:2] if event.output[:2] in _OUTPUTS else "DO"
+    number_ = output_number(event.output, letters, "URScript")
+    return f"set_{_OUTPUTS[letters]}_digital_out({number_}, {event.on})"
 
 
 def _tool(tool: Tool | None, payload: bool) -> list[str]:
@@ -100,6 +121,10 @@ _SAID = re.compile(rf"\s*(?:([avtr])\s*=)?\s*({_N})\s*", re.ASCII)
 _DEF = re.compile(r"def\s+(\w+)\s*\(\s*\)\s*:", re.ASCII)
 _CALL = re.compile(r"(\w+)\s*\(\s*\)", re.ASCII)
 _MOVES_NOTHING = frozenset({"sync", "zero_ftsensor", "end_force_mode"})
+_OUT = re.compile(
+    r"set_(?:(standard|configurable|tool)_)?digital_out\s*\(\s*(\d{1,3})\s*,\s*(True|False)\s*\)",
+    re.ASCII,
+)
 _HARMLESS = re.compile(
     r"(end|(set_|textmsg|popup|sync|stopl|stopj)\w*\s*\(.*\)|global\s.*)",
     re.ASCII,
@@ -125,6 +150,9 @@ def decode(source: Source) -> list[MotionStroke]:
             routines.end()
         elif called:
             routines.call(line, called[1])
+        if switched := _OUT.fullmatch(code):
+            letters = {kind: name for name, kind in _OUTPUTS.items()}[switched[1] or "standard"]
+            moves.switch(f"{letters}{int(switched[2])}", switched[3] == "True")
         if begun or called or _HARMLESS.fullmatch(code):
             continue
         slept = _SLEEP.fullmatch(code)

@@ -8,6 +8,9 @@ from dmpcli.errors import InputError
 
 MOCK = "mock:"
 
+# Of these a URL says what was simulated, and names no place.
+_SIMULATED = ("mock", "bench")
+
 
 @dataclass(frozen=True)
 class Address:
@@ -96,16 +99,17 @@ def _query(url: str, role: str, query: str) -> dict[str, str]:
 
 
 def in_provenance(url: str | None) -> str | None:
-    """Return what a file may say of an instrument: all of a mock's URL, of a real one its scheme.
+    """Return what a file may say of an instrument: a simulated URL, a real one's scheme.
 
     Parameters
     ----------
     url : str or None
         None where there is no such instrument.
     """
-    if url is None or url.startswith(MOCK):
-        return url
-    return url.partition(":")[0]
+    if url is None:
+        return None
+    scheme = url.partition(":")[0]
+    return url if scheme in _SIMULATED else scheme
 
 
 def need_tool(sensor: Address, given: bool) -> None:

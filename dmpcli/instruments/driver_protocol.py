@@ -128,6 +128,23 @@ class InverseDriver(Protocol):
 
 
 @runtime_checkable
+class OutputDriver(Protocol):
+    """What a driver offers besides `ServoDriver` if it can switch the controller's outputs."""
+
+    def output(self, name: str) -> None:
+        """Take note that an output will be switched; asks the controller nothing.
+
+        InputError where it has none of this name.
+        """
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output, within a period; InstrumentError where the controller does not do it.
+
+        A driver that can be halted beside a call that hangs switches off there what is on.
+        """
+
+
+@runtime_checkable
 class PlanDriver(Protocol):
     """What a driver offers besides `ServoDriver` if its controller plays a whole plan by itself."""
 

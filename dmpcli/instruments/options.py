@@ -94,6 +94,10 @@ class Options:
         """
         return _YES_NO[self.choice(key, "yes" if default else "no", *_YES_NO)]
 
+    def text(self, key: str) -> str | None:
+        """Read a text that the driver itself judges; None if absent."""
+        return self._text(key)
+
     def quarter_turn(self, key: str) -> float:
         """Read an angle of 0, 90, 180 or 270 degrees, 0 by default; return it in rad.
 

@@ -185,6 +185,17 @@ class DragTeaching(Protocol):
 
 
 @runtime_checkable
+class OutputSwitching(Protocol):
+    """What a robot whose controller's digital outputs can be switched offers besides `Servo`."""
+
+    def check_output(self, name: str) -> None:
+        """Make sure that there is an output of this name; InputError where there is not."""
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output now, while the arm moves or stands."""
+
+
+@runtime_checkable
 class PlanPlayer(Protocol):
     """What a robot that plays a whole plan by itself offers besides `Servo`."""
 

@@ -17,6 +17,7 @@ from dmpcli.instruments.driver_protocol import (
     DriverState,
     HaltingDriver,
     InverseDriver,
+    OutputDriver,
     PlanDriver,
     ServoDriver,
 )
@@ -164,6 +165,23 @@ class PoseServo:
         """Leave servo mode and stand still at once."""
         self._started = False
         self._driver.stop()
+
+    def check_output(self, name: str) -> None:
+        """Make sure that an output can be switched.
+
+        Raises
+        ------
+        InputError
+            The driver switches none, or none of this name.
+        """
+        if not isinstance(self._driver, OutputDriver):
+            raise InputError(f"robot: its driver switches no outputs, and {name} is one")
+        self._driver.output(name)
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output; InstrumentError where the controller does not do it."""
+        if isinstance(self._driver, OutputDriver):
+            self._driver.switch(name, on)
 
     def halt(self) -> bool:
         """Stop while another call hangs; False where the driver has no way to.

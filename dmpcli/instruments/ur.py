@@ -21,7 +21,7 @@ import numpy as np
 from dmpcli import extras
 from dmpcli.arrays import Floats
 from dmpcli.errors import DmpError, InputError, InstrumentError, RefusedError
-from dmpcli.instruments import sockets
+from dmpcli.instruments import outputs, sockets
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
 from dmpcli.instruments.options import Options
@@ -139,6 +139,9 @@ class UrDriver:
         self._control: Any = None
         self._servoing = False
         self._stamp: tuple[float, float] | None = None  # the controller's and when it was new
+        self._io: Any = None
+        self._outputs: list[str] = []  # that will be switched
+        self._on: list[str] = []
 
     def connect(self) -> DriverInfo:
         """Connect for reading; nothing starts on the robot.
@@ -221,6 +224,9 @@ class UrDriver:
                 lambda: interface(self._host),
             )
         control = self._control
+        if self._outputs and self._io is None:
+            outside = _package("rtde_io").RTDEIOInterface
+            self._io = self._asked("the connection for its outputs", lambda: outside(self._host))
         self._asked("setWatchdog", lambda: control.setWatchdog(self._watchdog))
         self._period = period
 
@@ -259,6 +265,38 @@ class UrDriver:
             )
         )
 
+    def output(self, name: str) -> None:
+        """Take note that an output will be switched: DO0 to DO7, CO0 to CO7 or TO0, TO1.
+
+        The control box's standard and configurable outputs, and the tool's.
+
+        Raises
+        ------
+        InputError
+        """
+        _output(name, self._name)
+        if name not in self._outputs:
+            self._outputs.append(name)
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output by RTDE, on a connection of its own.
+
+        Raises
+        ------
+        InstrumentError
+            The robot does not do it.
+        """
+        method, number = _output(name, self._name)
+        if self._io is None:
+            raise InstrumentError(f"{self._name}: {name}: its outputs are not connected")
+        if on and name not in self._on:
+            self._on.append(name)
+        if not self._asked(name, lambda: getattr(self._io, method)(number, on)):
+            word = "on" if on else "off"
+            raise InstrumentError(f"{self._name}: did not switch {name} {word}")
+        if not on and name in self._on:
+            self._on.remove(name)
+
     def stop(self) -> None:
         """Decelerate and end servo mode; the script on the robot stays until `close`."""
         control = self._control
@@ -288,6 +326,8 @@ class UrDriver:
                 answer = lines.readline(_LINE).strip()
         if not answer.startswith("Stopped"):
             raise InstrumentError(f"{self._name}: dashboard: stop: answers {answer[:60]!r}")
+        for name in list(self._on):
+            self.switch(name, on=False)
 
     def _stop_otherwise(self, failure: InstrumentError) -> None:
         """Stop what did not do servoStop, unless nothing moves it any more."""
@@ -307,14 +347,13 @@ class UrDriver:
         deeds: list[Callable[[], object]] = [self.stop]
         if self._control is not None:
             deeds += [self._control.stopScript, self._control.disconnect]
-        if self._receive is not None:
-            deeds.append(self._receive.disconnect)
+        deeds += [link.disconnect for link in (self._io, self._receive) if link is not None]
         for deed in deeds:
             try:
                 self._asked("disconnecting", deed)
             except InstrumentError as error:
                 failed = failed or error
-        self._control = self._receive = None
+        self._control = self._receive = self._io = None
         self._stamp, self._servoing = None, False
         if failed is not None:
             raise failed
@@ -372,6 +411,21 @@ class UrDriver:
         except (RuntimeError, OSError, ValueError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise InstrumentError(f"{self._name}: {what} failed: {said}") from None
+
+
+_OUTPUTS = {
+    "DO": ("setStandardDigitalOut", 7),
+    "CO": ("setConfigurableDigitalOut", 7),
+    "TO": ("setToolDigitalOut", 1),
+}
+"""Calls of ur-rtde and last numbers, by the letters that a name begins with."""
+
+
+def _output(name: str, robot: str) -> tuple[str, int]:
+    """Return ur-rtde's call that switches an output, and its number."""
+    method, last = _OUTPUTS.get(name[:2], _OUTPUTS["DO"])
+    letters = name[:2] if name[:2] in _OUTPUTS else "DO"
+    return method, outputs.number(name, robot, 0, last, letters)
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ from dmpcli.errors import InputError
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.spline import between, spline, window
 from dmpcli.spatial import rotations
+from dmpcli.spatial.output_events import OutputEvent
 
 Phase = Literal["approach", "stroke", "retract", "transfer", "stop"]
 Pose = tuple[Floats, Floats]
@@ -48,6 +49,10 @@ class PlannedStroke:
         Unit normal of the surface, to the tool's side.
     first_row : int
         Row of the file that holds the first sample, counted from 1.
+    events : tuple of OutputEvent
+        What is switched along it, on the time of `t`.
+    force : array, shape (n,), or None
+        Set-point of the force along the normal, N; 0 where the tool is lifted.
     """
 
     id: str
@@ -56,6 +61,8 @@ class PlannedStroke:
     rotation: Floats | None = None
     normal: Floats | None = None
     first_row: int = 1
+    events: tuple[OutputEvent, ...] = ()
+    force: Floats | None = None
 
     def pose(self, index: int) -> Pose:
         """Position and rotation of a sample; the stroke must state an orientation."""
@@ -103,6 +110,10 @@ class Plan:
         The stroke's.
     legs : tuple of (str, int)
         Phases in order, each with the number of its first set-point.
+    events : tuple of (float, OutputEvent)
+        What is switched, by the number of the set-point or between two.
+    force : array, shape (n,), or None
+        Set-point of the force along the normal, N; 0 where the tool is lifted.
     """
 
     period: float
@@ -115,6 +126,8 @@ class Plan:
     oriented: bool
     id: str
     legs: tuple[tuple[Phase, int], ...]
+    events: tuple[tuple[float, OutputEvent], ...] = ()
+    force: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -241,7 +254,11 @@ def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> 
     t = np.minimum(stroke.t[0] + np.arange(cycles + 1) * step, stroke.t[-1])
     position, turned = _resample(stroke.t, stroke.position, rotation, t)
     normal = None if stroke.normal is None else _unit(_linear(stroke.t, stroke.normal, t))
-    return replace(stroke, t=t - stroke.t[0], position=position, rotation=turned, normal=normal)
+    force = None if stroke.force is None else _pressed(stroke.t, stroke.force, t)
+    begun = float(stroke.t[0])
+    events = tuple(replace(event, t=event.t - begun) for event in stroke.events)
+    moved = replace(stroke, t=t - begun, position=position, rotation=turned)
+    return replace(moved, normal=normal, events=events, force=force)
 
 
 def joined(
@@ -273,6 +290,7 @@ def joined(
     tail = sum(len(leg.position) for leg in after)
 
     def held(values: Floats) -> Floats:
+        """Repeat the ends over the ways."""
         ends = np.repeat(values[:1], lead, axis=0), np.repeat(values[-1:], tail, axis=0)
         return np.concatenate([ends[0], values, ends[1]])
 
@@ -287,6 +305,11 @@ def joined(
         oriented,
         sampled.id,
         tuple((leg.phase, first) for leg, first in zip(parts, numbers, strict=False)),
+        tuple(
+            (lead + float(np.interp(event.t, sampled.t, np.arange(len(sampled.t)))), event)
+            for event in sampled.events
+        ),
+        None if sampled.force is None else held(sampled.force),
     )
 
 
@@ -374,6 +397,13 @@ def _flat(position: Floats, R: Floats) -> Floats:
 
 def _unflat(y: Floats) -> tuple[Floats, Floats]:
     return y[..., :3], rotations.from_quaternion(y[..., 3:])
+
+
+def _pressed(t: Floats, force: Floats, at: Floats) -> Floats:
+    """Force set-points at other times: between two that press linear, elsewhere the tool lifts."""
+    presses = np.interp(at, t, (force > 0.0).astype(float)) > 1.0 - 1e-9
+    pressed: Floats = np.where(presses, np.interp(at, t, force), 0.0)
+    return pressed
 
 
 def _linear(t: Floats, y: Floats, at: Floats) -> Floats:

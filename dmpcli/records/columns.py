@@ -125,3 +125,20 @@ def numbers(values: Any) -> AnyArray:
         return np.empty(0, dtype=dtype)
     whole = np.frombuffer(values.buffers()[1], dtype=dtype)
     return whole[values.offset : values.offset + len(values)].copy()
+
+
+def joined(chunked: Any) -> AnyArray:
+    """Numbers of a chunked array without nulls, shape (rows,)."""
+    found = np.empty(len(chunked), dtype=dtype_of(chunked.type))
+    first = 0
+    for chunk in chunked.chunks:
+        if len(chunk):
+            whole = np.frombuffer(chunk.buffers()[1], dtype=found.dtype)
+            found[first : first + len(chunk)] = whole[chunk.offset : chunk.offset + len(chunk)]
+            first += len(chunk)
+    return found
+
+
+def all_within(values: AnyArray, largest: float) -> bool:
+    """Tell whether no value is NaN or further from 0 than `largest`; takes no memory."""
+    return not len(values) or bool(values.min() >= -largest and values.max() <= largest)

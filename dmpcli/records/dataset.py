@@ -17,7 +17,7 @@ from dmpcli.records.columns import check_ids, columns_of
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
-from dmpcli.records.schemas import NORMAL, OK, Column, Schema
+from dmpcli.records.schemas import DRAWN_ON, NORMAL, OK, Column, Schema
 from dmpcli.records.trajectory_reader import unit_normals
 
 AGAIN = "the command that draws it goes on from the parts that are there"
@@ -251,7 +251,7 @@ def _compared(batch: BatchFolder) -> list[str]:
                 f"{part}: has {size} bytes, {file_io.MANIFEST} says {entry.bytes}: it is damaged "
                 "or of another batch; draw the batch again"
             )
-    there = {file.name for file in batch.folder.glob(file_io.PART)}
+    there = set(file_io.parts_of(batch.folder))
     more = sorted(there - listed)
     if not more:
         return []
@@ -275,6 +275,17 @@ def _footer(batch: BatchFolder, file: str) -> tuple[Any, Provenance]:
             "draw the batch again"
         )
     return part, found
+
+
+def surfaces_of(batch: BatchFolder) -> dict[str, str]:
+    """Return SHA-256 of the surfaces that the table names, by what it calls them."""
+    source = file_io.read_table(batch.folder)
+    with untrusted.decoding(source.name):
+        table = parquet.table(source)
+        if not set(DRAWN_ON) <= set(table.column_names):
+            return {}
+        names, hashes = (table.column(name).to_pylist() for name in DRAWN_ON)
+    return {name: sha256 for name, sha256 in zip(names, hashes, strict=True) if name and sha256}
 
 
 def facts_of(batch: BatchFolder) -> dict[str, Any]:

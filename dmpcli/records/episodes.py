@@ -66,7 +66,10 @@ def chosen(table: Table, episode: str | None, time: Sequence[str]) -> Table:
             f"--episode {episode}: column {column!r} of {table.name} has "
             f"{_shown(_different(texts))}"
         )
-    taken = {name: values.take(_indices(rows)) for name, values in table.columns.items()}
+    taken = {
+        name: values[rows] if isinstance(values, np.ndarray) else values.take(_indices(rows))
+        for name, values in table.columns.items()
+    }
     return EpisodeTable(
         **{
             **{name: getattr(table, name) for name in ("name", "decimal", "remarks")},

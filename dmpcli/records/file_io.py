@@ -282,11 +282,50 @@ def _write_special(file: Path, content: bytes) -> None:
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
 
 
-PART = "part-*.parquet"
 TABLE = "pairs.parquet"
 MANIFEST = "_manifest.json"
 
-_PART_NAME = re.compile(r"part-[0-9]{5,12}\.parquet")
+MOST_IN_FOLDER = 1000
+"""Parts in one folder, where a batch has so many that they lie in several."""
+
+_PART_FOLDER = re.compile(r"part-[0-9]{2,9}")
+_PART_FILE = re.compile(r"part-[^/]*\.parquet")
+_PART_NAME = re.compile(r"(?:part-[0-9]{2,9}/)?part-[0-9]{5,12}\.parquet")
+
+
+def part_name(number: int, nested: bool) -> str:
+    """Return the name of a part's file, in its folder where there are several."""
+    name = f"part-{number:05d}.parquet"
+    return f"part-{number // MOST_IN_FOLDER:02d}/{name}" if nested else name
+
+
+def parts_of(folder: Path) -> dict[str, os.stat_result]:
+    """Return the names of what looks like parts of a batch, with size and time of each.
+
+    Raises
+    ------
+    OSError
+    """
+    found: dict[str, os.stat_result] = {}
+    for inner in part_folders(folder):
+        prefix = "" if inner == folder else f"{inner.name}/"
+        with os.scandir(inner) as entries:
+            for entry in entries:
+                if _PART_FILE.fullmatch(entry.name) and entry.is_file():
+                    found[prefix + entry.name] = entry.stat()
+    return dict(sorted(found.items()))
+
+
+def part_folders(folder: Path) -> list[Path]:
+    """Return the folders that parts of a batch may lie in: its own, and those in it.
+
+    Raises
+    ------
+    OSError
+    """
+    with os.scandir(folder) as entries:
+        inner = [e.name for e in entries if _PART_FOLDER.fullmatch(e.name) and e.is_dir()]
+    return [folder, *(folder / name for name in sorted(inner))]
 
 
 def part_in(folder: str | Path, name: str, by: str) -> Path:

@@ -131,6 +131,11 @@ def _matrix(name: str) -> tuple[str, ...]:
     )
 
 
+def _entries(name: str, number: int) -> tuple[str, ...]:
+    """Spellings of an entry of a list, as tables of one column per entry have them."""
+    return f"{name}_{number}", f"{name}[{number}]", f"obs/{name}[{number}]", f"obs/{name}_{number}"
+
+
 _MOTIVE = Layout(
     {"t": ("Time (Seconds)",)}
     | {axis: (f"Position.{axis.upper()}",) for axis in "xyz"}
@@ -233,6 +238,55 @@ LAYOUTS = {
     "motive": _MOTIVE,
     # The same by its maker's name.
     "optitrack": _MOTIVE,
+    # Vicon's exports; see `vicon`, which reads their lines of subjects, columns and units.
+    "vicon": Layout(
+        {"t": ("Time",)}
+        | {axis: (f"T{axis.upper()}", axis.upper()) for axis in "xyz"}
+        | {f"q{axis}": (f"Quaternion.{axis.upper()}",) for axis in "xyzw"}
+        | {f"r{axis}": (f"R{axis.upper()}",) for axis in "xyz"},
+        rotation="quaternion",
+        prefixed=True,
+    ),
+    # Qualisys Track Manager's TSV exports; see `qualisys`.
+    "qualisys": Layout(
+        {"t": ("Time",)}
+        | {axis: (axis.upper(),) for axis in "xyz"}
+        | {f"r{i}{j}": (f"R{i}{j}",) for i in "123" for j in "123"},
+        rotation="matrix",
+        prefixed=True,
+    ),
+    # Marker trajectories of OpenSim and Cortex; see `trc`.
+    "trc": Layout({"t": ("Time",)} | {axis: (axis.upper(),) for axis in "xyz"}, prefixed=True),
+    # KITTI's ground truth: the first three rows of a pose matrix, row by row, m; no time.
+    "kitti": Layout(
+        length="m",
+        rotation="matrix",
+        header=("r11", "r12", "r13", "x", "r21", "r22", "r23", "y", "r31", "r32", "r33", "z"),
+    ),
+    # NDI Polaris, Vega and Aurora, as the maker's sample programs of its combined API write them.
+    "ndi": Layout(
+        {"t": ("timespec_s",), NANOSECONDS: ("timespec_ns",)}
+        | {axis: (f"T{axis}",) for axis in "xyz"}
+        | {"qw": ("Q0", "q0")}
+        | {f"q{axis}": (f"Q{axis}", f"q{axis}") for axis in "xyz"},
+        rotation="quaternion",
+    ),
+    # robosuite, robomimic: observations of an arm, m, quaternions x y z w.
+    "robomimic": Layout(
+        {"t": _TIMES}
+        | {axis: _entries("robot0_eef_pos", i) for i, axis in enumerate("xyz")}
+        | {f"q{axis}": _entries("robot0_eef_quat", i) for i, axis in enumerate("xyzw")},
+        length="m",
+        rotation="quaternion",
+    ),
+    # UMI and its kin: the same with rotation vectors.
+    "umi": Layout(
+        {"t": _TIMES}
+        | {axis: _entries("robot0_eef_pos", i) for i, axis in enumerate("xyz")}
+        | {f"r{axis}": _entries("robot0_eef_rot_axis_angle", i) for i, axis in enumerate("xyz")},
+        length="m",
+        rotation="rotvec",
+    ),
     # LeRobotDataset v2 and v3: what observation.state holds, meta/info.json says; m by custom.
     "lerobot": Layout(
         {"t": ("timestamp",)}
@@ -366,7 +420,7 @@ def suited(names: Sequence[str]) -> list[str]:
     """Return the known layouts that find time, position and rotation among a table's columns."""
     suits = []
     for key, layout in LAYOUTS.items():
-        if layout.rotation is None or key == "dmpcli":
+        if layout.rotation is None or key in ("dmpcli", "kitti"):
             continue  # it would fit anything
         wanted = ("t", *"xyz", *rotation_forms.columns_of(str(layout.rotation)))
         try:

@@ -13,6 +13,7 @@ from dmpcli.records.mesh_polygons import Triangles
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.mesh import Mesh
+    from dmpcli.surfaces.open_patches import Patch
 
 UNITS = LENGTH
 """mm in each unit of length that a mesh file may be in."""
@@ -125,6 +126,7 @@ def description(source: Source) -> dict[str, Any]:
     from dmpcli.surfaces.extent import area, volume
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.mesh_repair import borders, components
+    from dmpcli.surfaces.open_patches import open_patches
 
     found = triangles(source)
     mesh = _decoded(source.name, found, "mm")
@@ -146,8 +148,21 @@ def description(source: Source) -> dict[str, Any]:
         "error_median": error.median,
         "error_largest": error.largest,
         "noisy_share": Mesh(mesh.V, mesh.F).noisy_share,
+        "room": [_room(one) for one in open_patches(mesh.V, mesh.F)],
         "remarks": mesh.remarks,
     }
+
+
+def _room(patch: "Patch") -> str:
+    """Return where there is room for a stroke, as options of ``generalize`` say it."""
+
+    def said(point: Floats, digits: int = 1) -> str:
+        return " ".join(f"{value:.10g}" for value in np.round(point, digits) + 0.0)
+
+    return (
+        f"--start {said(patch.start)} --goal {said(patch.goal)}  ({patch.area:.4g} mm², normal "
+        f"{said(patch.normal, 2)})"
+    )
 
 
 def _likely_unit(size: float) -> str | None:

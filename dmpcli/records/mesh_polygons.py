@@ -6,6 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError, counted
+from dmpcli.records import columns
 
 LARGEST = 4_000_000
 """Triangles. Mending so many takes 4 GiB of memory."""
@@ -82,7 +83,7 @@ def cut(name: str, V: Floats, corners: Integers, counts: Integers) -> Triangles:
             "export the part again"
         )
     # Corners that are no places are named where the mesh is mended.
-    placed = np.where(np.abs(V) < 1e300, V, 0.0)
+    placed = np.where(np.abs(V) <= columns.LARGEST, V, 0.0)
     large = polygons.too_large(placed, corners, counts)
     if large is not None:
         raise InputError(

@@ -8,12 +8,11 @@ that the take tells. Format: docs.optitrack.com, Data Export: CSV (format versio
 import csv
 import io
 
-import numpy as np
-
 from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
+from dmpcli.records.text_lines import TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 MAGIC = b"Format Version,"
@@ -35,11 +34,7 @@ def read(source: Source) -> Table:
     InputError
         The lines about the columns are not there (exported without a header).
     """
-    try:
-        text = source.content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{source.name}: is not text in UTF-8") from None
-    every = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    every = every_line(source)
     at = next(
         (i for i, line in enumerate(every[:20]) if line.lstrip(",").startswith("Frame,")), None
     )
@@ -54,15 +49,14 @@ def read(source: Source) -> Table:
     names = _names(head[1:], take.get("Length Units", take.get("Units", "")))
     untrusted.judge_columns(source.name, len(names), names)
     kept = [i for i in range(at + 1, len(every)) if every[i].strip()]
-    body = "\n".join(every[i] for i in kept).encode()
-    lines = np.array(kept, dtype=np.int64) + 1
-    columns = tables.body_columns(body, names, b",", lines, source.name)
+    body = TextLines.kept(every, kept)
+    columns = tables.body_columns(body, names, b",", source.name)
     remarks = ["Motive's axes are taken as they are: y is up unless it was exported otherwise"]
     kind = take.get("Rotation Type", "Quaternion")
     if kind.lower() != "quaternion":
         remarks.append(f"rotations of type {kind} are not read; export them as Quaternion")
         columns = {k: v for k, v in columns.items() if ".Rotation." not in k}
-    return Table(source.name, columns, lines[: len(kept)], remarks=tuple(remarks))
+    return Table(source.name, columns, body.numbers, remarks=tuple(remarks))
 
 
 def _names(head: list[list[str]], unit: str) -> list[str]:

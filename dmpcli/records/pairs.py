@@ -1,16 +1,17 @@
 """Start-goal pairs from CSV or Parquet: every row is kept, bad ones with what is wrong."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
-from dmpcli.records import tables
+from dmpcli.records import pair_places, schemas, tables
 from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
+from dmpcli.records.pair_places import PairPlaces
 from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table
 from dmpcli.records.untrusted import decoder
@@ -28,6 +29,9 @@ FARTHEST = 1e6
 
 LARGEST_ANGLE = 1e3
 """Angles beyond this, rad, are a mistake."""
+
+KNOWN = ("id", *START, *GOAL, *START_ANGLES, *GOAL_ANGLES, "duration", *pair_places.COLUMNS)
+"""Columns that are read."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,12 @@ class PairTable:
         s; NaN where the table does not say.
     status : array of str, shape (B,)
         ``ok``, or what is wrong with the row, with its place in the file.
+    places : PairPlaces, optional
+        Where the table itself says on which surface each pair lies.
+    unknown : list of str
+        Columns that nobody reads.
+    before : int
+        Rows of the file before these, where it is read in pieces.
     """
 
     name: str
@@ -55,13 +65,16 @@ class PairTable:
     lines: Integers | None
     duration: Floats
     status: list[str]
+    places: PairPlaces | None = None
+    unknown: list[str] = field(default_factory=list)
+    before: int = 0
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def place(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     @property
     def good(self) -> Booleans:
@@ -75,15 +88,25 @@ class PairTable:
 def read(source: Source) -> PairTable:
     """Read a table with the columns ``x0 y0 z0 xg yg zg`` and what else it has.
 
-    Optional are ``id``, ``duration`` (s) and the orientations ``rx0 ry0 rz0``, ``rxg ryg rzg``
-    (X-Y-Z Euler angles, rad).
+    Optional are ``id``, ``duration`` (s), the orientations ``rx0 ry0 rz0``, ``rxg ryg rzg``
+    (X-Y-Z Euler angles, rad), and where each pair lies, see `pair_places`.
 
     Raises
     ------
     InputError
         The file cannot be read, holds no rows, lacks a column, or two rows have one id.
     """
-    table = tables.read(source)
+    return decoded(tables.read(source))
+
+
+def decoded(table: Table) -> PairTable:
+    """Return a table, or a piece of one, as pairs; see `read`.
+
+    Raises
+    ------
+    InputError
+        As `read`.
+    """
     status = [OK] * len(table)
     start, goal = _three(table, START, status), _three(table, GOAL, status)
     duration = np.full(len(table), np.nan)
@@ -91,8 +114,10 @@ def read(source: Source) -> PairTable:
         duration = table.floats("duration")
         bad = ~table.empty("duration") & ~(np.isfinite(duration) & (duration > 0))
         _mark(table, status, bad, "duration", "is not a positive time in s")
+    # A table of pairs that a batch ended with has more of its own, which mean no harm here.
+    known = (*KNOWN, *schemas.PAIRS.columns)
     return PairTable(
-        source.name,
+        table.name,
         _ids(table),
         Pairs(
             start,
@@ -103,6 +128,9 @@ def read(source: Source) -> PairTable:
         table.lines,
         duration,
         status,
+        pair_places.read(table, status),
+        [name for name in table.columns if name not in known],
+        table.before,
     )
 
 
@@ -141,7 +169,7 @@ def _rotations(table: Table, names: tuple[str, ...], status: list[str]) -> Float
 
 def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
-        return [str(row + 1) for row in range(len(table))]
+        return [str(table.before + row + 1) for row in range(len(table))]
     ids = table.texts("id")
     odd = next((row for row, name in enumerate(ids) if _CONTROL.search(name)), None)
     if odd is not None:

@@ -1,10 +1,11 @@
 """A record: one Parquet file between the stages, its columns as arrays and its provenance."""
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -14,7 +15,7 @@ from dmpcli.arrays import AnyArray, Booleans, Floats
 from dmpcli.errors import InputError
 from dmpcli.records import parquet, schemas, untrusted
 from dmpcli.records.columns import TYPES, columns_of, dtype_of
-from dmpcli.records.file_io import PART, TABLE, Source
+from dmpcli.records.file_io import TABLE, Source, parts_of
 from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
 from dmpcli.records.untrusted import decoder
@@ -135,7 +136,44 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
     OSError
         It cannot be written.
     """
-    form = form or Form()
+    table, said = _arrow_table(record, form or Form())
+    pq.write_table(table, sink, **said)
+
+
+class GrowingRecord:
+    """A Parquet file that is written some rows at a time; each time they are a row group.
+
+    Parameters
+    ----------
+    sink : file
+        Open Arrow or Python file.
+    form : Form, optional
+    """
+
+    def __init__(self, sink: Any, form: Form | None = None) -> None:
+        self._sink, self._form = sink, form or Form()
+        self._writer: Any = None
+
+    def add(self, record: Record) -> None:
+        """Write more rows, of one schema and provenance.
+
+        Raises
+        ------
+        OSError
+        """
+        table, said = _arrow_table(record, self._form)
+        if self._writer is None:
+            self._writer = pq.ParquetWriter(self._sink, table.schema, **said)
+        self._writer.write_table(table)
+
+    def close(self) -> None:
+        """Write what a file ends with."""
+        if self._writer is not None:
+            self._writer.close()
+
+
+def _arrow_table(record: Record, form: Form) -> tuple[Any, dict[str, Any]]:
+    """Return a record as an Arrow table, and how it is written."""
     fields, arrays = [], []
     for name, column in record.schema.columns.items():
         if name not in record.columns:
@@ -149,16 +187,13 @@ def store(record: Record, sink: Any, form: Form | None = None) -> None:
             pa.field(name, kind, metadata={"unit": column.unit, "meaning": column.meaning})
         )
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={KEY: header(record)}))
-    floats = [f.name for f in fields if pa.types.is_floating(f.type)]
-    others = [f.name for f in fields if not pa.types.is_floating(f.type)]
-    pq.write_table(
-        table,
-        sink,
-        compression=form.compression,
-        use_byte_stream_split=floats,
-        use_dictionary=others,
-        write_page_checksum=True,
-    )
+    said = {
+        "compression": form.compression,
+        "use_byte_stream_split": [f.name for f in fields if pa.types.is_floating(f.type)],
+        "use_dictionary": [f.name for f in fields if not pa.types.is_floating(f.type)],
+        "write_page_checksum": True,
+    }
+    return table, said
 
 
 def repeated(texts: Sequence[str], counts: int | Sequence[int]) -> Any:
@@ -225,7 +260,7 @@ def header(record: Record) -> bytes:
     p = record.provenance
     entries = {
         "schema": record.schema.name,
-        "version": record.schema.version,
+        "version": record.schema.version_of(record.columns),
         "tool": p.tool,
         "command": p.command,
         "options": p.options,
@@ -370,19 +405,41 @@ def _is_number(value: object) -> bool:
     return type(value) in (int, float) and bool(np.isfinite(value))  # type: ignore[call-overload]
 
 
+_FOOTER = 8
+"""Bytes at the end of a Parquet file: the length of its footer, and its mark."""
+
+
+def _may_be_ours(stream: BinaryIO) -> bool:
+    """Tell a file with our metadata, or a damaged or empty one; without parsing its footer."""
+    if stream.read(4) != parquet.MAGIC:
+        stream.seek(0)
+        return stream.read(1) == b""
+    end = stream.seek(0, os.SEEK_END)
+    stream.seek(max(0, end - _FOOTER))
+    tail = stream.read()
+    size = int.from_bytes(tail[:4], "little")
+    if tail[4:] != parquet.MAGIC or not 0 < size <= end - _FOOTER:
+        return True
+    stream.seek(end - _FOOTER - size)
+    # As Thrift's compact protocol writes the key: a string field, its length, its letters.
+    return b"\x18" + bytes([len(KEY)]) + KEY in stream.read(size)
+
+
 def foreign_parts(folder: Path) -> list[str]:
     """Names of files in a dataset folder that stand where ours would, but are not ours.
 
     A damaged Parquet file, or an empty one, counts as ours: a power cut can leave such parts.
     """
     foreign = []
-    for file in sorted([*folder.glob(PART), *folder.glob(TABLE)]):
+    names = sorted([*parts_of(folder), TABLE]) if folder.is_dir() else []
+    for file in (folder / name for name in names):
+        if not file.is_file():
+            continue
         try:
-            with untrusted.decoding(str(file)):
-                ours = KEY in (pq.read_schema(file).metadata or {})
-        except InputError:
             with file.open("rb") as stream:
-                ours = stream.read(4) in (b"", parquet.MAGIC)
+                ours = _may_be_ours(stream)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror}") from None
         if not ours:
-            foreign.append(file.name)
+            foreign.append(file.relative_to(folder).as_posix())
     return foreign

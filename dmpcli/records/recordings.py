@@ -4,7 +4,7 @@ Lengths, angles and times of other makes are converted here, at the edge, and wh
 them is told.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,12 +15,16 @@ from dmpcli.records import (
     layouts,
     motive,
     plausibility,
+    qualisys,
     record,
     rotation_forms,
     schemas,
     stamps,
     tables,
+    trc,
+    vicon,
 )
+from dmpcli.records.columns import all_within
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Layout, LayoutColumn
 from dmpcli.records.pairs import FARTHEST
@@ -39,6 +43,9 @@ LONGEST = 1e6
 
 SHORTEST_STEP = 1e-6
 """Rows nearer to each other than this, s, are in another unit of time."""
+
+SHORTEST_GAP = 5e-10
+"""No recorder counts finer than ns: single rows nearer than this, s, are no two times."""
 
 LARGEST_TURN = 4 * np.pi
 """Angles beyond this, rad, are in degrees."""
@@ -65,6 +72,8 @@ class Recording:
         Whether it is a file of this program's, which tells its units and angles.
     began : float or None
         What the file's clock shows at time 0, s; None where it shows dates, or there is none.
+    wrench : array, shape (T, 6), or None
+        On the tool, at the TCP, base axes, N and N·m, where it was asked for and is there.
     """
 
     stroke: Trajectory
@@ -72,6 +81,7 @@ class Recording:
     doubts: tuple[str, ...] = ()
     ours: bool = False
     began: float | None = None
+    wrench: Floats | None = None
 
 
 @dataclass
@@ -122,7 +132,7 @@ class _Reading:
 
 
 @decoder
-def read(source: Source, layout: Layout | None = None) -> Recording:
+def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> Recording:
     """Read a demonstration for learning.
 
     Parameters
@@ -131,6 +141,8 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
         One of our demonstration files, or any CSV or Parquet table.
     layout : Layout, optional
         Of another program's table; one of ours tells its own.
+    wrench : bool
+        Whether a wrench is wanted too, as `export` writes it: fx ... tz with N and N·m beside.
 
     Raises
     ------
@@ -145,7 +157,8 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
         stroke = Trajectory(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
-        return Recording(stroke, ours=True, began=0.0)
+        felt = _own_wrench(ours) if wrench else None
+        return Recording(stroke, ours=True, began=0.0, wrench=felt)
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
@@ -155,6 +168,7 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     t, name = _time(reading)
     position = _position(reading)
     rotation = _rotation(reading)
+    felt = _wrench(reading) if wrench else None
     stroke = Trajectory(t, position, rotation)
     if "sample_rate" not in given.said:
         stroke = _without_repeats(reading, stroke, name)
@@ -162,13 +176,33 @@ def read(source: Source, layout: Layout | None = None) -> Recording:
     _check_position(reading.table, stroke.position)
     _doubt_units(reading, stroke)
     reading.doubts += rotation_forms.unread(reading.names, reading.taken)
+    if felt is not None and len(felt) != len(stroke.t):
+        felt = None
+        reading.told.append("the wrench is left out: rows with one stamp were made one")
     began = _began(reading, name, float(t[0]))
-    return Recording(stroke, tuple(reading.told), tuple(reading.doubts), began=began)
+    told, doubts = tuple(reading.told), tuple(reading.doubts)
+    return Recording(stroke, told, doubts, began=began, wrench=felt)
 
 
 def stroke(source: Source, layout: Layout | None = None) -> Trajectory:
     """Read a demonstration, see `read`, without what there is to say of it."""
     return read(source, layout).stroke
+
+
+def export_of(source: Source) -> tuple[str, Table] | None:
+    """Read an export that tells itself by its first lines; None where it is none.
+
+    Returns
+    -------
+    str, Table
+        The layout that reads it, and what it holds.
+    """
+    if motive.is_motive(source):
+        return "motive", motive.read(source)
+    for kind in (vicon, qualisys, trc):
+        if kind.matches(source):
+            return kind.LAYOUT, kind.read(source)
+    return None
 
 
 def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
@@ -177,6 +211,15 @@ def _table(source: Source, layout: Layout) -> tuple[Table, Layout]:
         if not layout.columns:
             raise InputError(f"{source.name}: is an export of Motive; --layout motive reads it")
         return motive.read(source), layout
+    export = export_of(source)
+    if export is not None:
+        name, table = export
+        if layout.columns:
+            return table, layout
+        remark = f"recognised as --layout {name}; another --layout or --map says else"
+        given = {key: getattr(layout, key) for key in layout.said if key != "map"}
+        known = layouts.adapted(LAYOUTS[name], (), given)
+        return replace(table, remarks=(remark, *table.remarks)), known
     names = layout.header if "header" in layout.said else ()
     try:
         return tables.read(source, names, layout.decimal, episodes.NAMES), layout
@@ -221,6 +264,11 @@ def _headless(error: HeadlessError, commented: list[str] | None) -> str:
         return f"the names of the columns are commented out; {how} reads them"
     likely = {
         3: "--columns x,y,z --sample-rate HZ",
+        10: "--layout ros --columns header.stamp.sec,header.stamp.nanosec,header.frame_id,"
+        "pose.position.x,pose.position.y,pose.position.z,pose.orientation.x,pose.orientation.y,"
+        "pose.orientation.z,pose.orientation.w (ros2 topic echo --csv of a PoseStamped)",
+        12: "--layout kitti --sample-rate HZ (KITTI: a pose matrix row by row, no time)",
+        13: "--columns t,r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z --rotation matrix",
         4: "--columns t,x,y,z",
         7: "--columns t,x,y,z,rx,ry,rz",
         8: "--layout tum (t x y z qx qy qz qw)",
@@ -274,6 +322,33 @@ def _ros_time(reading: _Reading, column: LayoutColumn) -> Floats:
     unit = "ns" if whole and "time" not in reading.layout.said else reading.layout.time
     reading.units["time"] = unit
     return stamps.seconds(reading.table, column.name, unit)
+
+
+def _own_wrench(ours: record.Record) -> Floats | None:
+    if not ours.has(*schemas.WRENCH):
+        return None
+    values = ours.stack(schemas.WRENCH)
+    return None if np.isnan(values).any() else values
+
+
+def _wrench(reading: _Reading) -> Floats | None:
+    """Wrench of each row, shape (T, 6); None where no columns hold one in N and N·m, as ours do."""
+    found = {layouts.parted(name): name for name in reading.names}
+    wanted = [(name, "N" if name in schemas.FORCE else "N·m") for name in schemas.WRENCH]
+    if not all(key in found for key in wanted):
+        if all(any(parted[0] == name for parted in found) for name in schemas.WRENCH):
+            reading.told.append(
+                "fx ... tz are not read: [N] and [N·m] in their names would say that they are the "
+                "wrench on the tool, at the TCP, in base axes"
+            )
+        return None
+    names = [found[key] for key in wanted]
+    empty = np.any([reading.table.empty(name) for name in names])
+    if empty:
+        reading.told.append("the wrench is left out: it is not known in every row")
+        return None
+    reading.told.append("fx ... tz read as the wrench on the tool, at the TCP, in base axes")
+    return np.column_stack([reading.table.numbers(name) for name in names])
 
 
 def _position(reading: _Reading) -> Floats:
@@ -448,6 +523,12 @@ def _check_time(table: Table, t: Floats, name: str) -> None:
             f"{table.name}: column {name!r}: rows are {step:.3g} s apart; "
             "check the unit of time (--time-unit)"
         )
+    if np.any(steps < SHORTEST_GAP):
+        row = int(np.argmax(steps < SHORTEST_GAP)) + 1
+        raise InputError(
+            f"{table.name}: column {name!r}, {table.at(row)}: comes {steps[row - 1]:.3g} s after "
+            "the row before; mend or remove the row, or check the unit of time (--time-unit)"
+        )
     if np.any(steps > LONGEST_GAP * step):
         row = int(np.argmax(steps)) + 1
         raise InputError(
@@ -471,9 +552,8 @@ def _repeated(steps: Floats) -> str:
 
 
 def _check_position(table: Table, position: Floats) -> None:
-    beyond = np.abs(position).max(axis=1) > FARTHEST
-    if beyond.any():
-        row = int(np.argmax(beyond))
+    if not all_within(position, FARTHEST):
+        row = int(np.argmax(np.abs(position).max(axis=1) > FARTHEST))
         raise InputError(
             f"{table.name}: {table.at(row)}: the position is beyond {FARTHEST:g} mm; check the "
             "unit of length (--length-unit)"

@@ -3,6 +3,7 @@
 Lengths in mm, angles in rad, time in s, force in N, torque in N·m, all in the robot's base frame.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 FRAME = "robot base"
@@ -11,12 +12,17 @@ EULER = "X-Y-Z intrinsic, R = Rx(rx) Ry(ry) Rz(rz)"
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file: its unit, what it means, and whether a reader demands it."""
+    """One column of a file: its unit, what it means, whether a reader demands it, and since when.
+
+    A file is of the version of its newest column, so that an older reader refuses no file that it
+    reads right.
+    """
 
     unit: str
     meaning: str
     type: str = "double"
     required: bool = True
+    since: int = 1
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,10 @@ class Schema:
     version: int
     meaning: str
     columns: dict[str, Column] = field(default_factory=dict)
+
+    def version_of(self, names: Iterable[str]) -> int:
+        """Return the version of a file with these columns."""
+        return max([1, *(self.columns[name].since for name in names if name in self.columns)])
 
 
 OK = "ok"
@@ -40,6 +50,9 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+DRAWN_ON = ("drawn_on", "surface_sha256")
+JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6", "q7")
+"""Of an arm with fewer joints the first ones; no arm with more is logged."""
 
 
 def suffixed(names: tuple[str, ...], suffix: str) -> tuple[str, ...]:
@@ -76,16 +89,21 @@ DEMONSTRATION = Schema(
     },
 )
 
+EVENT = "event"
+"""Column of what is switched; see `spatial.output_events.stored`."""
+
 TRAJECTORY = Schema(
     "trajectory",
-    1,
+    2,
     "where the tool shall go",
     {
         "id": Column("1", "the start-goal pair", "string"),
         "t": Column("s", "time since the stroke began"),
     }
     | _pose("planned TCP")
-    | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL},
+    | {n: Column("1", "unit normal of the surface", required=False) for n in NORMAL}
+    | {EVENT: Column("1", "outputs switched from this row to the next", "string", False, since=2)}
+    | {"fn": Column("N", "force along the normal, 0 lifted", required=False, since=2)},
 )
 
 RUN = Schema(
@@ -106,10 +124,14 @@ RUN = Schema(
     | _wrench("compensated wrench on the tool, at the TCP, base axes")
     | {
         "coupling": Column("mm", "e of eq. (10), along the normal", required=False),
+        "fn": Column("N", "force along the normal to press with, 0 lifted", required=False),
+        "contact": Column("1", "state of the contact", "string", False),
         "state": Column("1", "robot state", "string"),
         "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
         "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),
-    },
+    }
+    | {n: Column("rad", "actual joint angle", required=False) for n in JOINTS}
+    | {EVENT: Column("1", "outputs that were switched in this cycle", "string", False)},
 )
 
 PAIRS = Schema(
@@ -132,6 +154,8 @@ PAIRS = Schema(
         "nx": Column("1", "unit normal of the pair's plane", required=False),
         "ny": Column("1", "unit normal of the pair's plane", required=False),
         "nz": Column("1", "unit normal of the pair's plane", required=False),
+        "drawn_on": Column("1", "surface, as the table of pairs names it", "string", False),
+        "surface_sha256": Column("1", "of the surface's file", "string", required=False),
         "part": Column("1", "file that holds the trajectory", "string", required=False),
         "status": Column("1", "ok, or why there is no trajectory", "string"),
     },

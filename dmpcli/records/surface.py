@@ -88,10 +88,11 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
     if unit not in (None, "mm"):
         raise InputError(f"{source.name}: {name} files are in mm; leave --surface-unit out")
     exact = DECODERS[name](source)
-    return exact if pose is None else _placed(exact, pose)
+    return exact if pose is None else placed(exact, pose)
 
 
-def _placed(exact: Exact, pose: Pose) -> Exact:
+def placed(exact: Exact, pose: Pose) -> Exact:
+    """Return an exact surface moved from its own frame into that of the pose."""
     if isinstance(exact, Plane):
         return Plane(pose.apply(exact.point), pose.rotation @ exact.normal)
     if isinstance(exact, Cylinder):

@@ -4,7 +4,6 @@ Text stays in Arrow's buffers until somebody asks for numbers: a million rows ar
 their bytes, and a bad cell can still be shown as it stands in the file.
 """
 
-import io
 import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -18,14 +17,13 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import columns, list_columns, parquet, untrusted
 from dmpcli.records.file_io import Source
+from dmpcli.records.text_lines import TextLines, counted_lines
 from dmpcli.records.untrusted import decoder
 
-_BLOCK = 1 << 24
+_BLOCK, _LARGEST_BLOCK = 1 << 20, 1 << 24
+"""Bytes that are parsed at once: what stays in cache, and more where a row is longer."""
 _LONGEST_LINE = 1 << 20
 _NUMBER = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"
-_PASSED_OVER = re.compile(rb"^[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
-_NEVER_WITHOUT = (b"#", b"\n\n", b"\n ", b"\n\t")
-"""A text that does not begin with a blank, and holds none of these, has no such line."""
 _SEPARATORS = (b",", b";", b"\t")
 _DECIMAL_COMMA, _DECIMAL_POINT = re.compile(rb"[0-9],[0-9]"), re.compile(rb"[0-9]\.[0-9]")
 
@@ -62,6 +60,8 @@ class Table:
         The decimal sign of its text.
     remarks : tuple of str
         What a person should know of how it was read.
+    before : int
+        Rows of the file before these, where it is read in pieces.
     """
 
     name: str
@@ -69,13 +69,14 @@ class Table:
     lines: Integers | None = None
     decimal: str = "."
     remarks: tuple[str, ...] = ()
+    before: int = 0
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def at(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
 
     def numbers(self, column: str) -> Floats:
         """Return a column as finite numbers, shape (rows,).
@@ -86,8 +87,8 @@ class Table:
             The column is missing, or a value is text, empty, NaN or infinite; names the row.
         """
         values = self.floats(column)
-        bad = ~(np.abs(values) <= columns.LARGEST)
-        if bad.any():
+        if not columns.all_within(values, columns.LARGEST):
+            bad = ~(np.abs(values) <= columns.LARGEST)
             row = int(np.argmax(bad))
             finite = bool(np.isfinite(values[row]))
             raise InputError(
@@ -213,43 +214,46 @@ def read(
 
 
 def _parquet(source: Source) -> Table:
-    table = parquet.table(source)
+    return of_arrow(source.name, parquet.table(source))
+
+
+def of_arrow(name: str, table: Any, before: int = 0) -> Table:
+    """Return an Arrow table, perhaps a piece of a file, as a `Table`."""
     columns: dict[str, Any] = {}
-    for name in table.column_names:
-        columns |= list_columns.expanded(name, table.column(name).combine_chunks())
-    return Table(source.name, columns)
+    for column in table.column_names:
+        columns |= list_columns.expanded(column, table.column(column).combine_chunks())
+    return Table(name, columns, before=before)
 
 
 def _csv(
     source: Source, given: Sequence[str], decimal: str | None, texts: Collection[str] | None
 ) -> Table:
-    text, lines = counted_lines(source)
-    end = text.find(b"\n") if b"\n" in text else len(text)
-    separator = _separator(text[:end], text[end + 1 : end + _LONGEST_LINE])
-    names = _cells(text[:end], separator)
+    body = counted_lines(source)
+    header, numbers = body.first(), body.numbers
+    separator = _separator(header, body.rest().text(_LONGEST_LINE))
+    names = _cells(header, separator)
     untrusted.judge_columns(source.name, len(names), names)
-    headless = bool(names) and all(map(_is_number, names))
+    headless = _are_values(names)
     if headless and not given:
-        raise HeadlessError(source.name, int(lines[0]), len(names))
-    body = text if headless else text[end + 1 :]
-    del text
+        raise HeadlessError(source.name, int(numbers[0]), len(names))
     remarks = []
     if given and not headless:
-        remarks.append(f"line {lines[0]} is not read: --columns names the columns")
+        remarks.append(f"line {numbers[0]} is not read: --columns names the columns")
     if not headless:
-        lines = lines[1:]
+        body = body.rest()
     if given:
         names = named(given, len(names), source.name)
     if separator == b" ":
-        body = _single_spaces(body)
+        body = body.of(_single_spaces(body.text()))
     elif b'"' in body:
-        body = re.sub(re.escape(separator) + rb"[ \t]+\"", separator + b'"', body)
+        spaced = re.escape(separator) + rb"[ \t]+\""
+        body = body.of(re.sub(spaced, separator + b'"', body.text()))
     twice = parquet.twice(names)
     if twice is not None:
         raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
     if decimal is None:
-        points = separator == b"," or _DECIMAL_POINT.search(body)
-        comma = not points and _DECIMAL_COMMA.search(body)
+        points = separator == b"," or body.search(_DECIMAL_POINT)
+        comma = not points and body.search(_DECIMAL_COMMA)
         decimal = "," if comma else "."
         if comma:
             remarks.append("commas between digits read as decimal signs")
@@ -257,13 +261,13 @@ def _csv(
     if texts is not None and decimal == ".":
         found = _number_columns(body, names, separator, texts)
     if found is None:
-        found = body_columns(body, names, separator, lines, source.name)
+        found = body_columns(body, names, separator, source.name)
     rows = len(next(iter(found.values()), ()))
-    return Table(source.name, found, lines[:rows], decimal, tuple(remarks))
+    return Table(source.name, found, body.numbers[:rows], decimal, tuple(remarks))
 
 
 def _number_columns(
-    body: bytes, names: Sequence[str], separator: bytes, texts: Collection[str]
+    body: TextLines, names: Sequence[str], separator: bytes, texts: Collection[str]
 ) -> dict[str, Any] | None:
     """Part the rows of a text table, with numbers parsed on the way: half of the time and memory.
 
@@ -273,12 +277,10 @@ def _number_columns(
     Returns
     -------
     dict or None
-        None where a cell of such a column is none, or no finite one: read as text, it can be shown
-        as it stands.
+        Arrays of numpy, and of Arrow where a column is text. None where a cell of a column of
+        numbers is none, or no finite one: read as text, it can be shown as it stands.
     """
-    # Not by partition, which would copy all of the rest.
-    end = body.find(b"\n")
-    first = _cells(body[: end if end >= 0 else len(body)], separator)
+    first = _cells(body.first(), separator)
     kinds = {
         name: pa.float64() if name not in texts and _is_small(cell) else pa.string()
         for name, cell in zip(names, first, strict=False)
@@ -289,10 +291,18 @@ def _number_columns(
         table = _parsed(body, names, separator, kinds)
     except pa.ArrowInvalid:
         return None
-    found = {name: table.column(name).combine_chunks() for name in table.column_names}
-    for name, kind in kinds.items():
-        if kind == pa.float64() and not np.isfinite(columns.numbers(found[name])).all():
+    found: dict[str, Any] = {}
+    for name in names:
+        column = table.column(name)
+        table = table.drop_columns([name])  # its memory goes as soon as it is copied
+        if kinds[name] == pa.string():
+            found[name] = column.combine_chunks()
+            continue
+        values = columns.joined(column)
+        # NaN is the least and the largest of what it is among.
+        if not len(values) or not np.isfinite([values.min(), values.max()]).all():
             return None
+        found[name] = values
     return found
 
 
@@ -303,35 +313,45 @@ def _is_small(cell: str) -> bool:
     return re.match(_NUMBER, cell) is not None and abs(float(cell)) <= _EXACT
 
 
-def _parsed(body: bytes, names: Sequence[str], separator: bytes, kinds: Mapping[str, Any]) -> Any:
+def _parsed(
+    body: TextLines, names: Sequence[str], separator: bytes, kinds: Mapping[str, Any]
+) -> Any:
     from pyarrow import csv
 
-    return csv.read_csv(
-        io.BytesIO(body),
-        read_options=csv.ReadOptions(use_threads=False, block_size=_BLOCK, column_names=names),
-        parse_options=csv.ParseOptions(
-            delimiter=separator.decode(), newlines_in_values=b'"' in body
-        ),
-        convert_options=csv.ConvertOptions(
-            column_types=kinds, strings_can_be_null=False, null_values=[]
-        ),
-    )
+    def parsed(block: int) -> Any:
+        return csv.read_csv(
+            body.reader(),
+            read_options=csv.ReadOptions(
+                use_threads=False, block_size=min(block, len(body) + 1), column_names=names
+            ),
+            parse_options=csv.ParseOptions(
+                delimiter=separator.decode(), newlines_in_values=b'"' in body
+            ),
+            convert_options=csv.ConvertOptions(
+                column_types=kinds, strings_can_be_null=False, null_values=[]
+            ),
+        )
+
+    try:
+        return parsed(_BLOCK)
+    except pa.ArrowInvalid:
+        if len(body) <= _BLOCK:
+            raise
+        return parsed(_LARGEST_BLOCK)  # a row may be longer than the block
 
 
 def body_columns(
-    body: bytes, names: Sequence[str], separator: bytes, lines: Integers, name: str
+    body: TextLines, names: Sequence[str], separator: bytes, name: str
 ) -> dict[str, Any]:
     """Part the rows of a text table.
 
     Parameters
     ----------
-    body : bytes
+    body : TextLines
         The rows alone.
     names : sequence of str
         Of the columns.
     separator : bytes
-    lines : array of int, shape (rows,)
-        The number of each row's line.
     name : str
         Of the file, for messages.
 
@@ -345,13 +365,13 @@ def body_columns(
     InputError
         No rows, or one of another length.
     """
-    if not body:
+    if not len(body):
         raise InputError(f"{name}: holds no rows; it needs a header and at least one row")
     # As text: numbers are parsed by column, so that a bad cell can be named with its line.
     try:
         table = _parsed(body, names, separator, dict.fromkeys(names, pa.string()))
     except pa.ArrowInvalid as error:
-        raise InputError(f"{name}: {_complaint(str(error), lines, len(names))}") from None
+        raise InputError(f"{name}: {_complaint(str(error), body.numbers, len(names))}") from None
     return {key: table.column(key).combine_chunks() for key in table.column_names}
 
 
@@ -382,6 +402,12 @@ def _separator(header: bytes, body: bytes) -> bytes:
 
 def _is_number(cell: str) -> bool:
     return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
+
+
+def _are_values(cells: Sequence[str]) -> bool:
+    """Tell a row from names: numbers, among them a word or two such as a frame's name."""
+    numbers = sum(map(_is_number, cells))
+    return bool(cells) and (numbers == len(cells) or (numbers > 3 and len(cells) - numbers <= 2))
 
 
 def named(given: Sequence[str], count: int, source: str) -> list[str]:
@@ -426,25 +452,6 @@ def commented_names(source: Source, count: int) -> list[str] | None:
 
 def _is_passed_over(line: str) -> bool:
     return line.strip()[:1] in ("", "#")
-
-
-def counted_lines(source: Source) -> tuple[bytes, Integers]:
-    """Lines of a text file that count, joined, and the number of each."""
-    content = source.content.removeprefix(b"\xef\xbb\xbf")
-    try:
-        # Only to know that it is text; Arrow takes the bytes.
-        content.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{source.name}: is neither a Parquet file nor text in UTF-8") from None
-    if b"\r" in content:
-        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    content = content.rstrip(b"\n")
-    likely = content[:1] in b" \t\n" or any(sign in content for sign in _NEVER_WITHOUT)
-    if not likely or _PASSED_OVER.search(content) is None:
-        return content, np.arange(1, content.count(b"\n") + 2)
-    every = content.split(b"\n")
-    kept = [number for number, line in enumerate(every) if not _PASSED_OVER.fullmatch(line)]
-    return b"\n".join([every[number] for number in kept]), np.array(kept, dtype=np.int64) + 1
 
 
 def _complaint(error: str, lines: Integers, expected: int) -> str:

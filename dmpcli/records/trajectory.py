@@ -13,8 +13,9 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
 from dmpcli.records.record import Provenance, Record, repeated
-from dmpcli.records.schemas import EULER_ANGLES, NORMAL, POSITION
-from dmpcli.spatial import rotations
+from dmpcli.records.schemas import DRAWN_ON, EULER_ANGLES, NORMAL, POSITION
+from dmpcli.spatial import output_events, rotations
+from dmpcli.spatial.output_events import OutputEvent
 
 LEAST_HEIGHT = 1e-9
 """A stroke that begins and ends nearer to the surface than this is on it, mm."""
@@ -83,7 +84,12 @@ def facts_of_several(stroke: DrawnStroke, rate: float) -> dict[str, Any]:
     return facts
 
 
-def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Provenance) -> Record:
+def trajectory_record(
+    ids: Sequence[str],
+    strokes: Sequence[DrawnStroke],
+    p: Provenance,
+    events: Sequence[Sequence[OutputEvent]] = (),
+) -> Record:
     """Return the record of several strokes, one after the other.
 
     Parameters
@@ -93,6 +99,8 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Pro
     strokes : sequence of DrawnStroke
         At least one; all with orientation or all without, all flat or all on a curved surface.
     p : Provenance
+    events : sequence of sequence of OutputEvent
+        What each stroke switches; none where nothing was asked for.
     """
     columns: dict[str, Any] = {
         "id": repeated(ids, [len(s.timing.t) for s in strokes]),
@@ -104,11 +112,28 @@ def trajectory_record(ids: Sequence[str], strokes: Sequence[DrawnStroke], p: Pro
     if angles:
         euler = np.concatenate(angles)
         columns |= {name: euler[:, i] for i, name in enumerate(EULER_ANGLES)}
-    normals = [s.normal for s in strokes if s.normal is not None and len(s.normal) > 1]
-    if normals:
-        normal = np.concatenate(normals)
+    if any(s.normal is not None and len(s.normal) > 1 for s in strokes):
+        normal = np.concatenate([_normals(s) for s in strokes])
         columns |= {name: normal[:, i] for i, name in enumerate(NORMAL)}
+    forces = [s.force for s in strokes if s.force is not None]
+    if forces:
+        columns["fn"] = np.concatenate(forces)
+    if events:
+        texts = [
+            text
+            for one, stroke in zip(events, strokes, strict=True)
+            for text in output_events.stored(one, stroke.timing.t)
+        ]
+        columns[schemas.EVENT] = np.array(texts, dtype=object)
     return Record(schemas.TRAJECTORY, columns, p)
+
+
+def _normals(stroke: DrawnStroke) -> Floats:
+    """Normals of a stroke at each of its samples, shape (T, 3); NaN where it has none."""
+    shape = stroke.position.shape
+    if stroke.normal is None:
+        return np.full(shape, np.nan)
+    return np.broadcast_to(stroke.normal, shape)
 
 
 def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record:
@@ -131,6 +156,8 @@ def block_record(ids: Sequence[str], block: DrawnBlock, p: Provenance) -> Record
         columns |= {name: _column(block.euler[..., i]) for i, name in enumerate(EULER_ANGLES)}
     if block.normal is not None and block.normal.shape[1] > 1:
         columns |= {name: _column(block.normal[..., i]) for i, name in enumerate(NORMAL)}
+    if block.force is not None:
+        columns["fn"] = np.tile(block.force, count)
     return Record(schemas.TRAJECTORY, columns, p)
 
 
@@ -147,6 +174,7 @@ def pairs_record(
     part: Sequence[str],
     status: Sequence[str],
     p: Provenance,
+    surfaces: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Record:
     """Return the record that says what became of each pair.
 
@@ -159,6 +187,8 @@ def pairs_record(
     normal : array, shape (B, 3)
         NaN for pairs that were not drawn.
     p : Provenance
+    surfaces : tuple of (sequence of str, sequence of str), length B each, optional
+        What the table calls the surface of each pair, and its SHA-256.
     """
     columns: dict[str, AnyArray] = {"id": np.array(ids, dtype=object)}
     groups: list[tuple[Sequence[str], Floats | None]] = [
@@ -172,6 +202,8 @@ def pairs_record(
         if values is not None:
             columns |= {name: values[:, i] for i, name in enumerate(names)}
     columns["duration"] = duration
+    if surfaces is not None:
+        columns |= dict(zip(DRAWN_ON, (np.array(v, dtype=object) for v in surfaces), strict=True))
     columns["part"] = np.array(part, dtype=object)
     columns["status"] = np.array(status, dtype=object)
     return Record(schemas.PAIRS, columns, p)

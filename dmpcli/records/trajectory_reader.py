@@ -11,8 +11,13 @@ from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.record import Record
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.trajectory import Trajectory
+
+LARGEST_FORCE = 1e4
+"""More along the normal is a slip of the unit, N."""
 
 UNIT = 1e-3
 """By how much the length of a unit normal may miss 1, and its direction another's, rad."""
@@ -29,11 +34,17 @@ class StoredTrajectory(Trajectory):
         Row of the file that holds the first sample, counted from 1.
     facts : dict
         What the file says beside it; of a batch, with the start, goal and normal of its pair.
+    events : tuple of OutputEvent
+        What is switched along it.
+    force : array, shape (n,), or None
+        Set-point of the force along the normal, N; 0 where the tool is lifted.
     """
 
     id: str = ""
     first_row: int = 1
     facts: dict[str, Any] = field(default_factory=dict)
+    events: tuple[OutputEvent, ...] = ()
+    force: Floats | None = None
 
 
 def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
@@ -85,7 +96,18 @@ def stored(
         name,
         int(rows[0]) + 1 if len(rows) else 1,
         facts,
+        _events(record, rows, t),
+        _forces(record, rows),
     )
+
+
+def _events(record: Record, rows: Integers, t: Floats) -> tuple[OutputEvent, ...]:
+    if schemas.EVENT not in record.columns or record.schema is not schemas.TRAJECTORY:
+        return ()
+    try:
+        return output_events.read(record.columns[schemas.EVENT][rows].tolist(), t)
+    except output_events.NotPlacedError as error:
+        raise InputError(f"{_of(record)}column {schemas.EVENT!r}, {error}") from None
 
 
 def _of(record: Record) -> str:
@@ -106,6 +128,20 @@ def _optional(record: Record, names: tuple[str, ...], rows: Integers) -> Floats 
             f"stroke has some of {', '.join(names)}; fill it in or leave them all out"
         )
     return np.asarray(values, dtype=float)
+
+
+def _forces(record: Record, rows: Integers) -> Floats | None:
+    """Return the force set-points of some rows, shape (n,); None where the file states none."""
+    found = _optional(record, ("fn",), rows) if record.schema is schemas.TRAJECTORY else None
+    if found is None:
+        return None
+    bad = np.flatnonzero(~((found[:, 0] >= 0.0) & (found[:, 0] <= LARGEST_FORCE)))
+    if len(bad):
+        raise InputError(
+            f"{_of(record)}column 'fn', row {rows[bad[0]] + 1}: {found[bad[0], 0]:g} N; a force "
+            f"along the normal is 0 (lifted) to {LARGEST_FORCE:g} N"
+        )
+    return found[:, 0]
 
 
 def _normals(record: Record, rows: Integers, facts: Mapping[str, Any]) -> Floats | None:

@@ -9,6 +9,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
 from dmpcli.dmp.contact_heights import ContactHeights
@@ -21,7 +22,7 @@ from dmpcli.records import learning_record as lessons
 from dmpcli.records.dataset import BatchFolder, Piece
 from dmpcli.records.learning_record import Lesson
 from dmpcli.reporting import stroke_measures as measured
-from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
+from dmpcli.reporting.report_surface import AT_ONCE, Grounds, ReportSurface, placed
 from dmpcli.reporting.stroke import LEAST, ReportedStroke, as_drawn
 from dmpcli.reporting.strokes import over_of, role_of
 from dmpcli.spatial import rotations
@@ -93,12 +94,15 @@ class MeasurementContext:
         Of a surface that is a plane.
     drawn : Drawn
         By which skill the demonstration is seen.
+    grounds : Grounds, optional
+        The surfaces of batches, where each stroke has its own.
     """
 
     reference: ReportedStroke | None = None
     ground: ReportSurface | None = None
     normal: Floats | None = None
     drawn: Drawn = _AS_TAUGHT
+    grounds: Grounds | None = None
     _others: dict[Drawn, "MeasurementContext"] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -145,7 +149,8 @@ def measured_parts(
     InputError
         A part is damaged, is not the batch's, or holds a stroke that cannot be measured.
     """
-    more = schemas.NORMAL if sight.ground is None else (*schemas.NORMAL, *schemas.EULER_ANGLES)
+    lying = sight.ground is not None or sight.grounds is not None
+    more = (*schemas.NORMAL, *schemas.EULER_ANGLES) if lying else schemas.NORMAL
     parts = None if only is None else np.unique(batch.part[only]).tolist()
 
     def tasks() -> Iterator[Callable[[], MeasuredBlock]]:
@@ -154,12 +159,25 @@ def measured_parts(
                 if only is not None:
                     which = which[np.isin(piece.rows[which], only)]
                 size = max(1, _SAMPLES // len(t))
-                size = size if sight.ground is None else min(size, AT_ONCE)
-                for first in range(0, len(which), size):
-                    some = which[first : first + size]
-                    yield partial(_measured, batch, piece, some, t, label, sight)
+                size = min(size, AT_ONCE) if lying else size
+                for number, those in _apart(batch, piece, which, sight):
+                    for first in range(0, len(those), size):
+                        some = those[first : first + size]
+                        yield partial(_measured, batch, piece, some, t, label, sight, number)
 
     return _in_turn(tasks())
+
+
+def _apart(
+    batch: BatchFolder, piece: Piece, which: Integers, sight: MeasurementContext
+) -> Iterator[tuple[int | None, Integers]]:
+    """Trajectories of a piece by the surface that they lie on, with its number."""
+    if sight.grounds is None:
+        yield None, which
+        return
+    on = sight.grounds.of(batch.ids.take(pa.array(piece.rows[which])).to_pylist())
+    for number in np.unique(on).tolist():
+        yield number, which[on == number]
 
 
 def _measured(
@@ -169,8 +187,13 @@ def _measured(
     t: Floats,
     label: str,
     sight: MeasurementContext,
+    ground: int | None,
 ) -> MeasuredBlock:
-    return _Block(batch, piece, which, t, label, sight).measured()
+    own = sight.ground
+    if ground is not None:
+        assert sight.grounds is not None
+        own = sight.grounds.ground(ground)
+    return _Block(batch, piece, which, t, label, sight, own).measured()
 
 
 def _in_turn(tasks: Iterator[Callable[[], MeasuredBlock]]) -> Iterator[MeasuredBlock]:
@@ -235,6 +258,8 @@ class _Block:
         Their places in the piece.
     t : array, shape (n,)
         s, from 0.
+    ground : ReportSurface, optional
+        What they lie on.
     """
 
     def __init__(
@@ -245,7 +270,9 @@ class _Block:
         t: Floats,
         label: str,
         sight: MeasurementContext,
+        ground: ReportSurface | None,
     ) -> None:
+        self.ground = ground
         self.batch, self.piece, self.t, self.label = batch, piece, t, label
         self.sight = sight.of_drawn(piece.facts)
         self.rows, self.first = piece.rows[which], piece.first[which]
@@ -319,11 +346,11 @@ class _Block:
         waves = many_waves(flat, self.length, self.closed)
         column["wave_height"][:], column["wave_spread"][:] = waves.mean, waves.spread
         self._compare(column, self.known, place[:, self.known], self._stretch())
-        if self.sight.ground is None:
+        if self.ground is None:
             return MeasuredBlock(self.rows, self.role, table, self.t, waves, self._stroke)
         strokes = placed(
             [self._stroke(i) for i in range(len(self.rows))],
-            self.sight.ground,
+            self.ground,
             self.sight.reference,
         )
         self._place(column, strokes)

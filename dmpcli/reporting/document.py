@@ -82,6 +82,8 @@ class DocumentPart:
         Where one of our own files comes from.
     compared : Compared, optional
         Pose by pose with the first of its kind, or with its plan.
+    ids : list of str
+        Of the strokes of a smaller batch.
     """
 
     name: str
@@ -97,6 +99,7 @@ class DocumentPart:
     many: MeasuredBatch | None = None
     origin: Provenance | None = None
     compared: Compared | None = None
+    ids: list[str] = field(default_factory=list)
 
 
 def lesson_for(parts: Sequence[DocumentPart], sha256: str) -> Lesson | None:

@@ -18,7 +18,6 @@ from dmpcli.records import (
     layouts,
     mesh,
     mesh_formats,
-    motive,
     pose,
     record,
     recordings,
@@ -32,7 +31,7 @@ from dmpcli.records import json_schema as publish
 from dmpcli.records import tables as records_tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.trajectory_reader import rows_by_id, stored
-from dmpcli.reporting import skill_words, tables
+from dmpcli.reporting import recording_summary, skill_words, tables
 from dmpcli.reporting.stroke_measures import Row
 
 NAME, VERSION = "inspection", 1
@@ -46,14 +45,22 @@ _GUESSES = {
 """Names under which other programs store what `fit` needs; compared without case."""
 
 
-def inspected(source: Source) -> Row:
+def inspected(source: Source, layout: layouts.Layout | None = None, options: str = "") -> Row:
     """Describe one file.
+
+    Parameters
+    ----------
+    source : Source
+    layout : Layout, optional
+        How a recording of another program is read.
+    options : str
+        That say it, as they are typed.
 
     Returns
     -------
     dict
         ``file, sha256, bytes, format, ours, schema, version, summary`` and, where it has them,
-        ``rows, duration, rate, strokes, columns, provenance, content, mapping``.
+        ``rows, duration, rate, strokes, columns, provenance, content, mapping, recording``.
 
     Raises
     ------
@@ -66,7 +73,7 @@ def inspected(source: Source) -> Row:
     if record.is_ours(source):
         return head | {"format": "Parquet"} | _ours(source)
     if records_tables.is_parquet(source):
-        return head | {"format": "Parquet"} | _foreign(source)
+        return head | {"format": "Parquet"} | _foreign(source, layout, options)
     if content.lstrip()[:1] == b"{" and not mesh_formats.is_gltf(source):
         return head | {"format": "JSON"} | _json(source)
     if source.name.endswith(".toml"):
@@ -74,7 +81,7 @@ def inspected(source: Source) -> Row:
     kind = mesh_formats.format_of(source)
     if kind is not None:
         return head | {"format": kind} | _mesh(source)
-    return head | {"format": "CSV"} | _foreign(source)
+    return head | {"format": "CSV"} | _foreign(source, layout, options)
 
 
 def as_json(found: Row) -> bytes:
@@ -110,8 +117,11 @@ def as_text(found: Row, width: int) -> str:
         lines += textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
     if found.get("columns"):
         lines += ["", _columns(found["columns"])]
-    if "mapping" in found:
-        lines += ["", _advice(found)]
+    if "recording" in found:
+        lines += ["", *recording_summary.lines(found["recording"], width)]
+    if "mapping" in found and "refused" in found["recording"] and "advice" not in found:
+        advice = _advice(found)
+        lines += textwrap.wrap(advice, width) if _AS_IT_IS not in advice else []
     return tables.plain(lines, width)
 
 
@@ -133,11 +143,12 @@ def _ours(source: Source) -> Row:
     return {
         "ours": True,
         "schema": found.schema.name,
-        "version": found.schema.version,
+        "version": found.schema.version_of(found.columns),
         "summary": f"{found.schema.meaning[0].upper()}{found.schema.meaning[1:]}.",
         "mark": tolerance_mark.of_facts(p.facts),
         "rows": len(found),
         **_timing(found),
+        **_recorded(source, found),
         "columns": columns,
         "provenance": {
             "tool": p.tool,
@@ -149,6 +160,13 @@ def _ours(source: Source) -> Row:
             "euler": schemas.EULER,
         },
     }
+
+
+def _recorded(source: Source, found: record.Record) -> Row:
+    """Describe a demonstration as its readers see it."""
+    if found.schema is not schemas.DEMONSTRATION:
+        return {}
+    return {"recording": recording_summary.summary(source, None, "")}
 
 
 def _timing(found: record.Record) -> Row:
@@ -268,17 +286,16 @@ def _mesh(source: Source) -> Row:
         "version": None,
         "summary": f"A triangle mesh, to draw on with --surface. It does not tell its unit: {guess}"
         "; lengths below are in its own.",
-        "content": content,
+        "told": [f"room: {one}" for one in content["room"]],
+        "content": {key: value for key, value in content.items() if key != "room"},
     }
 
 
-def _foreign(source: Source) -> Row:
+def _foreign(source: Source, layout: layouts.Layout | None, options: str) -> Row:
     advice, table = None, None
     try:
-        if motive.is_motive(source):
-            table = motive.read(source)
-        else:
-            table = records_tables.read(source, decimal=None)
+        export = recordings.export_of(source)
+        table = records_tables.read(source, decimal=None) if export is None else export[1]
     except records_tables.HeadlessError as error:
         advice = str(error).partition(": ")[2]
         try:
@@ -298,6 +315,7 @@ def _foreign(source: Source) -> Row:
         "columns": [_column(name, table.floats(name)) for name in names],
         "mapping": _mapping(names),
         "layouts": layouts.suited(names),
+        "recording": recording_summary.summary(source, layout, options),
     } | ({} if advice is None else {"advice": advice})
 
 
@@ -374,6 +392,9 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.6g}"
 
 
+_AS_IT_IS = "fit reads it as it is"
+
+
 def _advice(found: Row) -> str:
     mapping, suits = found["mapping"], found["layouts"]
     if "advice" in found:
@@ -394,7 +415,7 @@ def _advice(found: Row) -> str:
         )
     if all(layouts.parted(name)[0] == wanted for wanted, name in mapping.items()):
         told = all(layouts.parted(name)[1] for name in mapping.values())
-        return f"fit reads it as it is{'' if told else ', if lengths are in mm and times in s'}."
+        return f"{_AS_IT_IS}{'' if told else ', if lengths are in mm and times in s'}."
     how = " ".join(f"--map {wanted}={name}" for wanted, name in mapping.items() if name != wanted)
     return f"fit could read it with {how}; it also takes --length-unit and --time-unit."
 

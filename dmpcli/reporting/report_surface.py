@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -47,6 +48,16 @@ class ReportSurface:
     def curved(self) -> bool:
         """Whether it may be other than a plane."""
         return not isinstance(self.surface, Plane)
+
+
+class Grounds(Protocol):
+    """The surfaces of a batch whose strokes lie on many."""
+
+    def of(self, ids: Sequence[str]) -> Integers:
+        """Return the number of the surface of each stroke, shape (k,)."""
+
+    def ground(self, number: int) -> ReportSurface:
+        """Return a surface; several threads may ask at once."""
 
 
 def placed(

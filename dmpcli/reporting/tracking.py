@@ -6,9 +6,9 @@ import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.records.record import Record
-from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION, WRENCH
 
-_ACTUAL = {"t", *POSITION, *EULER_ANGLES, *WRENCH}
+_ACTUAL = {"t", *POSITION, *EULER_ANGLES, *WRENCH, *JOINTS}
 
 
 def lookahead_of(run: Record) -> float:

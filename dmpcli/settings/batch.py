@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
@@ -31,6 +32,13 @@ class BatchOptions(Settings):
     pairs_per_part: Annotated[
         int, Ge(1), Le(1_000_000), Option("Pairs in one file of the folder.")
     ] = 2000
+    surfaces_per_part: Annotated[
+        int, Ge(1), Le(10_000), Option("Surfaces in one file, where the table names them.")
+    ] = 16
+    surface_cache: Annotated[
+        Path | None,
+        Option("Keep prepared meshes here for later runs.", metavar="DIR", unset="none"),
+    ] = None
     float32: Annotated[bool, Option("Store poses in single precision.")] = False
     compression: Annotated[Literal["zstd", "lz4", "snappy", "none"], Option("Of the parts.")] = (
         "zstd"
@@ -50,10 +58,17 @@ class BatchOptions(Settings):
         """Which share, from 1, of how many."""
         return _share(self.shard)
 
-    def as_options(self) -> dict[str, Any]:
-        """Return what changes the result; who draws, and in how many shares, does not."""
+    def as_options(self, sites: bool = False) -> dict[str, Any]:
+        """Return what changes the result; who draws, and in how many shares, does not.
+
+        Parameters
+        ----------
+        sites : bool
+            Whether the table names surfaces.
+        """
         said = super().as_options()
-        return {key: said[key] for key in ("on_error", "pairs_per_part", "float32", "compression")}
+        names = ["on_error", "pairs_per_part", "float32", "compression"]
+        return {key: said[key] for key in [*names, *(["surfaces_per_part"] if sites else [])]}
 
 
 def _share(text: str) -> tuple[int, int]:

@@ -1,7 +1,8 @@
 """The settings of `execute`: where each default comes from."""
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from annotated_types import Ge, Le
 
@@ -10,13 +11,19 @@ from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.ranges import CORNERS, Box
 
 if TYPE_CHECKING:
-    from dmpcli.admittance.force_coupling import CouplingLaw
+    from dmpcli.admittance.force_law import ForceGains
 
 # No product of two of them overflows.
 Positive = Annotated[float, Ge(1e-9), Le(1e9)]
 
 COUPLED = 0.1
-"""Look-ahead that the coupling's mass and damping are for, s."""
+"""Look-ahead behind which a force is held well, s."""
+
+SETPOINT = 5.0
+"""Of a marking pen, where neither trajectory nor person says another, N."""
+
+CLAMP = 15.0
+"""How far off the plan a surface may be that is drawn on, mm; below the usual clearance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,55 +97,115 @@ class ExecuteSettings(Settings):
         Option("What the tool file may miss of the reading at rest; torque at 0.1 m.", "N"),
     ] = 1.5
     # Of a marking pen; a polishing pad wants more.
-    force_setpoint: Annotated[Positive, Option("Force to press with.", "N")] = 5.0
-    # M/D = 40 ms and no spring: the force settles at the set-point without a steady error, on a
-    # plate of 5 N/mm behind 0.1 s of look-ahead within about a second. It seeks at F_d/D. A longer
-    # look-ahead raises M and D in proportion: the stiffest plate that is stable has about D/delay.
-    coupling_mass: Positive = 0.08
-    coupling_damping: Positive = 2.0
+    force_setpoint: Annotated[
+        Positive | None,
+        Option("Force to press with.", "N", unset="the trajectory's, else 5"),
+    ] = None
+    stiffness: Annotated[
+        Positive | None,
+        Option("Of tool and surface in series.", "N/mm", unset="measured at the landing"),
+    ] = None
+    delay: Annotated[
+        Annotated[float, Ge(1e-3), Le(2)] | None,
+        Option("From a displacement to its force.", "s", unset="measured at the landing"),
+    ] = None
+    on_contact_loss: Annotated[
+        Literal["seek", "hold", "stop"],
+        Option("Where contact is lost: seek it again and then stop, go on, or stop."),
+    ] = "seek"
+    min_contact: Annotated[
+        float,
+        Ge(0),
+        Le(100),
+        Option("Share of a stroke in contact that counts as drawn.", "%"),
+    ] = 95.0
+    # None of them is by the rule of `admittance.force_law`, from what the landing has measured.
+    coupling_mass: Positive | None = None
+    coupling_damping: Positive | None = None
     coupling_stiffness: Annotated[float, Ge(0), Le(1e9)] = 0.0
-    coupling_clamp: Positive = 5.0
+    # Limits of its own: how far off the plan the surface may be, how fast the correction, how hard.
+    coupling_clamp: Positive | None = None
+    coupling_rate: Positive = 10.0
+    coupling_limit: Annotated[float, Ge(1.2), Le(100)] = 2.0
+    # What is more across the normal than drag + rub times the normal force is a wall.
+    coupling_drag: Positive = 3.0
+    coupling_rub: Annotated[float, Ge(0), Le(100)] = 0.6
+    # How far off the plan's start the surface is looked for, and how fast before anything is known.
+    coupling_reach: Positive = 6.0
+    coupling_seek: Positive = 2.0
     coupling_contact: Positive = 0.5
-    coupling_patience: Positive = 0.1
+    coupling_patience: Positive = 0.06
     coupling_release: Positive = 10.0
+    # What a lifted tool may read: its zero and payload are another's beyond.
+    coupling_zero_limit: Positive = 2.0
 
-    def law(self, lookahead: float = 0.0) -> "CouplingLaw":
-        """The admittance model of the force coupling.
+    @property
+    def clamp(self) -> float:
+        """How far off the plan the surface may be that is drawn on, mm: less than the clearance."""
+        if self.coupling_clamp is not None:
+            return self.coupling_clamp
+        return CLAMP if self.clearance is None else min(CLAMP, 0.75 * self.clearance)
+
+    @property
+    def reach(self) -> float:
+        """How far off the plan's start it is looked for, mm."""
+        return min(self.coupling_reach, self.clamp)
+
+    def setpoint(self, largest: float | None = None) -> float:
+        """The force to press with, N.
 
         Parameters
         ----------
-        lookahead : float
-            Of the arm, s; beyond `COUPLED` the model is slowed down in proportion.
+        largest : float, optional
+            The trajectory's own largest set-point; 0 of one that is lifted all along.
 
         Raises
         ------
         InputError
-            It would be unstable at the servo period, or press as hard as the run allows.
+            It is as hard as the run allows.
         """
+        wanted = self.force_setpoint or largest or SETPOINT
+        if wanted >= self.max_force:
+            said = "--force-setpoint" if self.force_setpoint else "the trajectory's fn ="
+            raise InputError(
+                f"{said} {wanted:g}: is not below --max-force {self.max_force:g}, at which the run "
+                "stops"
+            )
+        return wanted
+
+    def chosen_gains(self) -> "ForceGains | None":
+        """The gains of the force coupling where a configuration states them; None is by the rule.
+
+        Raises
+        ------
+        InputError
+            They would be unstable at the servo period, with no contact at all; or with
+            `stiffness` and `delay` where these are named.
+        """
+        if self.coupling_damping is None:
+            if self.coupling_mass is not None:
+                raise InputError(
+                    "[execute] coupling_mass: says nothing without coupling_damping; give both, or "
+                    "leave both to the rule"
+                )
+            return None
         import numpy as np
 
         from dmpcli.admittance import model as admittance
-        from dmpcli.admittance.force_coupling import CouplingLaw
+        from dmpcli.admittance.force_law import ForceGains
+        from dmpcli.admittance.force_stability import is_stable
 
-        if self.force_setpoint >= self.max_force:
-            raise InputError(
-                f"--force-setpoint {self.force_setpoint:g}: is not below --max-force "
-                f"{self.max_force:g}, at which the run stops"
-            )
-        slow = max(lookahead / COUPLED, 1.0)
+        damping = self.coupling_damping
+        mass = self.period * damping if self.coupling_mass is None else self.coupling_mass
         model = admittance.AdmittanceLaw(
-            np.array([slow * self.coupling_mass]),
-            np.array([slow * self.coupling_damping]),
-            np.array([self.coupling_stiffness]),
-            self.period,
+            np.array([mass]), np.array([damping]), np.array([self.coupling_stiffness]), self.period
         )
         admittance.check_stable(model, ("along the normal",))
-        return CouplingLaw(
-            model,
-            self.force_setpoint,
-            self.coupling_clamp,
-            # A force-setpoint near or below it would count as no contact.
-            min(self.coupling_contact, self.force_setpoint / 2.0),
-            self.coupling_patience,
-            self.coupling_release,
-        )
+        made = ForceGains(mass, damping, self.coupling_stiffness, math.inf, self.period)
+        k, late = self.stiffness, self.delay
+        if k is not None and late is not None and not is_stable(made, k, late):
+            raise InputError(
+                f"[execute] coupling_damping = {damping:g}: unstable on a contact of {k:g} N/mm "
+                f"behind {late:g} s (--stiffness, --delay); raise it, or leave it to the rule"
+            )
+        return made

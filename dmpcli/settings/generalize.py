@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le
 
 from dmpcli.dmp.options import Amplitude, OnBorder, Orientation
 from dmpcli.settings.model import Option, Settings
@@ -12,6 +12,8 @@ from dmpcli.settings.process import ProcessSettings
 
 if TYPE_CHECKING:
     from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+
+_FORCE = "force_setpoint"
 
 NotNegative = Annotated[float, Ge(0), Le(86_400)]
 
@@ -61,9 +63,20 @@ class GeneralizeSettings(ProcessSettings):
     turn: Annotated[
         float, Ge(-360), Le(360), Option("Turn of a closed stroke about the normal.", "°")
     ] = 0.0
+    force_setpoint: Annotated[
+        float | None,
+        Gt(0),
+        Le(1e4),
+        Option("Force to press with in contact, 0 where the pen is lifted.", "N", unset="none"),
+    ] = None
     allow_stretch: Annotated[
         bool, Option("Start and goal at any distance, however it distorts.")
     ] = False
+
+    def as_options(self) -> dict[str, Any]:
+        """Return the settings as JSON values; a force that nobody asked for leaves no trace."""
+        said = super().as_options()
+        return said if self.force_setpoint else {k: v for k, v in said.items() if k != _FORCE}
 
     def style(self) -> "GeneralizeOptions":
         """Return the settings as the mathematics takes them; heights are for the skill to tell."""
@@ -78,6 +91,7 @@ class GeneralizeSettings(ProcessSettings):
             size=self.scale,
             turn=math.radians(self.turn),
             allow_stretch=self.allow_stretch,
+            force=self.force_setpoint,
         )
 
 

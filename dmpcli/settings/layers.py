@@ -56,6 +56,36 @@ def resolve(
     """
     from pydantic import ValidationError
 
+    merged, origin = _layered(kind, preset, config)
+    given = {key: value for key, value in options.items() if value is not None}
+    try:
+        checked: S = _adapter(kind).validate_python(merged | given)  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise InputError(_first(error, kind, given, origin)) from None
+    return checked
+
+
+def origins(
+    kind: type[Settings],
+    options: Mapping[str, Any],
+    preset: str | None = None,
+    config: Path | None = None,
+) -> dict[str, str]:
+    """Return where each setting comes from, by name: an option, a file, a preset, the default.
+
+    The parameters and errors are those of `resolve`.
+    """
+    _, origin = _layered(kind, preset, config)
+    found = {one.name: origin.get(one.name, "default") for one in settings_of(kind)}
+    flags = {one.name: one.flag for one in settings_of(kind)}
+    given = {key: f"option {flags[key]}" for key, value in options.items() if value is not None}
+    return found | given
+
+
+def _layered(
+    kind: type[Settings], preset: str | None, config: Path | None
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return what preset and file say, and which of them says it."""
     merged: dict[str, Any] = {}
     origin: dict[str, str] = {}
     for label, values in (
@@ -64,12 +94,7 @@ def resolve(
     ):
         merged |= values
         origin |= dict.fromkeys(values, label)
-    given = {key: value for key, value in options.items() if value is not None}
-    try:
-        checked: S = _adapter(kind).validate_python(merged | given)  # type: ignore[arg-type]
-    except ValidationError as error:
-        raise InputError(_first(error, kind, given, origin)) from None
-    return checked
+    return merged, origin
 
 
 @lru_cache
@@ -93,8 +118,20 @@ def _preset(name: str, section: str) -> tuple[str, dict[str, Any]]:
             f"--preset {name}: no such preset; there are {', '.join(preset_names())}, "
             "or give a file that ends in .toml"
         )
-    text = (resources.files("dmpcli") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return _toml_section(f"preset {name}", text, section)
+    return _toml_section(f"preset {name}", preset_text(name), section)
+
+
+def preset_text(name: str) -> str:
+    """Return a preset of ours as the TOML file that it is.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    if name not in preset_names():
+        raise InputError(f"{name}: no such preset; there are {', '.join(preset_names())}")
+    return (resources.files("dmpcli") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def _read(path: Path) -> str:

@@ -117,7 +117,7 @@ class Setting:
             return None
         forms = [*self.choices]
         for part in _parts(self.base):
-            form = {int: "N", float: "NUMBER", Path: "FILE"}.get(part, "")
+            form = {int: "INTEGER", float: "NUMBER", Path: "FILE"}.get(part, "")
             unit = self.option.unit if self.option and part is float else ""
             forms.append(said or _capital(unit) or form)
         return "|".join(form for form in forms if form) or "NAME"

@@ -12,12 +12,29 @@ the model has a TOML section); `given` holds what the command line itself says, 
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, NewType, get_args, get_origin
+from typing import Annotated, Any, NewType, Protocol, get_args, get_origin
 
 import typer
 
 from dmpcli.settings.layers import preset_names, resolve
 from dmpcli.settings.model import Setting, Settings, settings_of
+
+
+class Described(Protocol):
+    """Says every setting of a command and where it comes from, as TOML or JSON."""
+
+    def __call__(self, name: str, said: dict[str, Any], as_json: bool) -> str:
+        """Return the text.
+
+        Parameters
+        ----------
+        name : str
+            Of the command.
+        said : dict
+            What the command line says, by parameter.
+        as_json : bool
+        """
+
 
 Given = NewType("Given", dict[str, Any])
 """What the command line itself says of the settings, by field name."""
@@ -43,9 +60,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     section: type[Settings] | None = None
     wants_given = ""
     for parameter in inspect.signature(command).parameters.values():
-        kind, only = parameter.annotation, None
-        if get_origin(kind) is Annotated and isinstance(get_args(kind)[1], Only):
-            kind, only = get_args(kind)[0], get_args(kind)[1].names
+        kind, only = _opened(parameter.annotation)
         if kind is Given:
             wants_given = parameter.name
         elif isinstance(kind, type) and issubclass(kind, Settings):
@@ -64,21 +79,42 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     if section is not None:
         parameters += _layers(section)
 
-    def run(**said: Any) -> None:
+    def parted(said: dict[str, Any]) -> tuple[dict[str, Any], dict[str, tuple[Any, ...]]]:
+        """Take the settings out of what was said; return those given, and each model's layers."""
         preset, config = (said.pop(name, None) for name in ("preset", "config"))
         given = {name: _converted(one, said.pop(name)) for name, one in options.items()}
         given = {name: value for name, value in given.items() if value is not None}
+        layers: dict[str, tuple[Any, ...]] = {}
         for name, kind in models.items():
             own = {one.name: given[one.name] for one in settings_of(kind) if one.name in given}
-            layers = (preset, config) if kind.section else ()
-            said[name] = resolve(kind, own, *layers)
+            layers[name] = (own, preset, config) if kind.section else (own,)
+        return given, layers
+
+    def described(name: str, said: dict[str, Any], as_json: bool) -> str:
+        from dmpcli.settings.described import text
+
+        _, layers = parted(said)
+        return text(name, [(models[key], *layers[key]) for key in models], as_json)
+
+    def run(**said: Any) -> None:
+        given, layers = parted(said)
+        for name, kind in models.items():
+            said[name] = resolve(kind, *layers[name])
         if wants_given:
             said[wants_given] = given
         command(**said)
 
     run.__doc__, run.__module__, run.__name__ = command.__doc__, command.__module__, "command"
     run.__dict__.update(__signature__=inspect.Signature(parameters), __wrapped__=command)
+    run.__dict__["described"] = described
     return run
+
+
+def _opened(kind: Any) -> tuple[Any, tuple[str, ...] | None]:
+    """Return what a parameter's annotation is, and which fields of a model it shows."""
+    if get_origin(kind) is Annotated and isinstance(get_args(kind)[1], Only):
+        return get_args(kind)[0], get_args(kind)[1].names
+    return kind, None
 
 
 def choice(*words: str) -> Callable[[str], list[str]]:

@@ -56,6 +56,15 @@ class ProcessSettings(Settings):
         Option("At the ends and in corners at most.", "mm/s²", unset=f"{ACCELERATION:g}"),
     ] = None
 
+    event: Annotated[
+        tuple[str, ...] | None,
+        Option(
+            "Switch an output along the path, again for each; off@..., start, end, lift, touch.",
+            metavar="on@12.5mm:DO1",
+            unset="none",
+        ),
+    ] = None
+
     @property
     def inclination(self) -> "Inclination | None":
         """How the tool leans; None leaves it as the skill has it."""

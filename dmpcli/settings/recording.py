@@ -3,11 +3,12 @@
 What the words mean, and whether they are any, `records.layouts` and `records.recordings` say.
 """
 
+import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from dmpcli.errors import InputError
-from dmpcli.settings.model import Option, Settings
+from dmpcli.settings.model import Option, Settings, settings_of
 
 if TYPE_CHECKING:
     from dmpcli.records.layouts import Layout
@@ -34,6 +35,13 @@ class RecordingOptions(Settings):
                 "fanuc",
                 "motive",
                 "optitrack",
+                "vicon",
+                "qualisys",
+                "trc",
+                "kitti",
+                "ndi",
+                "robomimic",
+                "umi",
                 "lerobot",
                 "dmpcli",
             ),
@@ -92,6 +100,18 @@ class RecordingOptions(Settings):
         str | None,
         Option("Decimal sign.", choices=(".", ","), unset="recognised where it is plain"),
     ] = None
+
+    def as_words(self) -> str:
+        """Return the options as they are typed; empty where they say nothing."""
+        words: list[str] = []
+        for one in settings_of(type(self)):
+            value = getattr(self, one.name)
+            if value == one.default:
+                continue
+            for each in value if isinstance(value, tuple) else (value,):
+                text = f"{each:g}" if isinstance(each, float) else str(each)
+                words += [one.flag] if each is True else [one.flag, shlex.quote(text)]
+        return " ".join(words)
 
     def as_layout(self) -> "Layout | None":
         """Return the layout that the options describe; None where they say nothing.

@@ -1,7 +1,7 @@
 """The options of ``simulate``."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
@@ -36,6 +36,10 @@ class SimulateOptions(Settings):
     strokes: Annotated[
         int, Ge(0), Option("How many strokes the hand draws before it stays away.")
     ] = 1
+    physics: Annotated[
+        Literal["springs", "mujoco"],
+        Option("Contact by a spring under the tip, or arm and pen in MuJoCo: needs dmpcli[bench]."),
+    ] = "springs"
     lookahead: Annotated[
         float, Ge(0), Le(1), Option("Of the arm that the hand has practised with.", "s")
     ] = 0.1

@@ -324,6 +324,11 @@ def from_quaternion(q: Floats) -> Floats:
     array, shape (..., 3, 3)
     """
     q = np.asarray(q, dtype=float)
+    if q.ndim == 2 and len(q) > _IN_CACHE:
+        whole: Floats = np.empty((len(q), 3, 3))
+        for first in range(0, len(q), _IN_CACHE):
+            whole[first : first + _IN_CACHE] = from_quaternion(q[first : first + _IN_CACHE])
+        return whole
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     K = skew(q[..., :3])
     R: Floats = np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)

@@ -64,7 +64,7 @@ _WORDS = {
     ),
     Status.FACES_AWAY: (
         "the surface at the start faces away from the tool, which would stand inside the part",
-        "turn the tool there with --start X Y Z RX RY RZ, or begin where the part faces it",
+        "turn the tool there with --start-orientation RX RY RZ, or begin where the part faces it",
     ),
     Status.NO_GEODESIC: (
         "no geodesic from start to goal was found in any heading: a corner, hole or gap is between",

@@ -56,7 +56,7 @@ class Topology:
     @cached_property
     def border(self) -> Booleans:
         """Edges with one face only, shape (m, 3)."""
-        alone: Booleans = self.uses == 1
+        alone: Booleans = self.neighbours == -1
         return alone
 
     @cached_property
@@ -86,7 +86,7 @@ class Topology:
         V : array, shape (vertices, 3)
         """
         count = int(self.components.max(initial=-1)) + 1
-        closed = np.bincount(self.components, (self.uses > 2).any(axis=1), count) == 0
+        closed = np.bincount(self.components, (self.neighbours == -2).any(axis=1), count) == 0
         face, edge = np.nonzero(self.border)
         if len(face) == 0:
             return np.asarray(closed)

@@ -1,7 +1,8 @@
 """The geometry of triangle meshes: closest points with smooth normals, borders, resolution."""
 
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -31,6 +32,27 @@ ON_BORDER = 1e-2
 LEAST_REACH = 0.3
 
 
+@dataclass(frozen=True)
+class MeshParts:
+    """What is costly to find of a mesh of m faces, to be kept and given back as it is.
+
+    Attributes
+    ----------
+    neighbours : array of int, shape (m, 3)
+        See `Topology`.
+    components : array of int, shape (m,)
+    corner_normals : array, shape (m, 3, 3)
+    noise, heights : array, shape (m,)
+        mm.
+    """
+
+    neighbours: Integers
+    components: Integers
+    corner_normals: Floats
+    noise: Floats
+    heights: Floats
+
+
 class TriangleMesh:
     """A triangle mesh in the robot's base frame; see `Mesh` for geodesics and charts on it.
 
@@ -48,6 +70,27 @@ class TriangleMesh:
         self.V = np.ascontiguousarray(V, dtype=float)
         self.F = np.ascontiguousarray(F, dtype=np.int64)
         self.topology = Topology(self.F, len(self.V))
+
+    @property
+    def parts(self) -> MeshParts:
+        """What is costly to find, see `with_parts`."""
+        return MeshParts(
+            self.topology.neighbours,
+            self.components,
+            self.corner_normals,
+            self.noise,
+            self._heights,
+        )
+
+    @classmethod
+    def with_parts(cls, V: Floats, F: Integers, parts: MeshParts) -> Self:
+        """Return the mesh of which these are `parts`: bit by bit as if it had found them itself."""
+        mesh = cls(V, F)
+        # As cached properties keep what they found.
+        vars(mesh.topology).update(neighbours=parts.neighbours, components=parts.components)
+        found = {name: getattr(parts, name) for name in ("corner_normals", "noise")}
+        vars(mesh).update(found, _heights=parts.heights)
+        return mesh
 
     def __reduce__(self) -> tuple[type["TriangleMesh"], tuple[Floats, Integers]]:
         # What was built does not travel to another process; it is built there again.
@@ -168,17 +211,29 @@ class TriangleMesh:
         return developable(self.corners, self.F, self.dihedrals, border, CREASE)
 
     @cached_property
-    def _normal_maps(self) -> Floats:
-        """Per face the affine map from a position to its smooth normal, shape (m, 3, 4).
+    def _known_maps(self) -> tuple[Floats, Booleans]:
+        """Maps of `_normal_maps`, and which of them are made; memory is taken as they are."""
+        return np.empty((len(self.F), 3, 4)), np.zeros(len(self.F), dtype=bool)
 
-        Barycentric interpolation written as one product; positions count from `_middle`.
+    def _normal_maps(self, face: Integers) -> Floats:
+        """Of each face (N,) the affine map from a position to its smooth normal, shape (N, 3, 4).
+
+        Barycentric interpolation written as one product; positions count from `_middle`. A stroke
+        asks for few of all faces, again and again.
         """
-        corners = self.corners - self._middle
+        maps, known = self._known_maps
+        if not known[face].all():
+            new = np.unique(face[~known[face]])
+            maps[new], known[new] = self._made_maps(new), True
+        return maps[face]
+
+    def _made_maps(self, face: Integers) -> Floats:
+        corners = self.corners[face] - self._middle
         opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
         n = cross(opposite[:, 0], opposite[:, 1])
         # Gradients of the barycentric coordinates: exact on slivers too.
         gradients = cross(n[:, None], opposite) / dot(n, n)[:, None]
-        N = self.corner_normals
+        N = self.corner_normals[face]
         slope = np.swapaxes(N, -1, -2) @ gradients
         offset = N[:, 0, :, None] - slope @ corners[:, 0, :, None]
         return np.concatenate([slope, offset], axis=-1)
@@ -250,7 +305,7 @@ class TriangleMesh:
 
     def smooth_normals(self, position: Floats, face: Integers) -> Floats:
         """Unit normals (N, 3) at points of faces, interpolated between the corners'."""
-        maps = self._normal_maps[face]
+        maps = self._normal_maps(face)
         local = position - self._middle
         return unit(np.einsum("nij,nj->ni", maps[..., :3], local) + maps[..., 3])
 

@@ -1,30 +1,81 @@
 """How ``generalize`` draws a table of pairs: the run, and what it tells."""
 
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from dmpcli.batch.part import Job
-from dmpcli.batch.run import Batch, Shard, Summary
+from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, Shard, Summary, run
+from dmpcli.batch.site import SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.feasibility import snapped
 from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
-from dmpcli.messages import progress, tell, warn
-from dmpcli.records import file_io, trajectory
-from dmpcli.records.pairs import PairTable
+from dmpcli.messages import heard, progress, tell, tell_as, warn
+from dmpcli.records import file_io, pair_stream, trajectory
+from dmpcli.records.pair_stream import PairStream
+from dmpcli.records.pairs import KNOWN, PairTable
 from dmpcli.records.record import Form
-from dmpcli.records.schemas import OK
 from dmpcli.settings.batch import BatchOptions
+from dmpcli.surfaces.plane import Plane
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import SLOW, SPLIT
-
-SHOWN = 20
-"""Bad pairs that are named on the terminal; all are in the folder's table."""
 
 
 def write(ready: Ready, output: Path, wanted: BatchOptions) -> None:
     """Draw the batch into a folder and say what became of it."""
-    _tell(ready.table, output, Shard(*wanted.share), draw_into(ready, output, wanted))
+    summary = draw_into(ready, output, wanted)
+    _tell(ready.table.name, output, Shard(*wanted.share), summary)
+
+
+def write_pieces(
+    stream: PairStream, prepare: Callable[[PairTable], Ready], output: Path, wanted: BatchOptions
+) -> None:
+    """Draw a table piece by piece into a folder, and say what became of it.
+
+    Parameters
+    ----------
+    stream : PairStream
+    prepare : callable
+        Checks a piece and makes it ready.
+    output : Path
+    wanted : BatchOptions
+
+    Raises
+    ------
+    InputError
+        No pair can be drawn, or pieces see what they are drawn on from two sides.
+    """
+    rows = max(
+        wanted.pairs_per_part, pair_stream.ROWS // wanted.pairs_per_part * wanted.pairs_per_part
+    )
+    stream.check_ids(rows)
+    if wanted.stop:
+        with heard():  # it is told as they are drawn
+            for table in stream.pieces(rows):
+                prepare(table)
+    told: set[str] = set()
+
+    def readies() -> Iterator[Ready]:
+        for number, table in enumerate(stream.pieces(rows)):
+            if number == 0:
+                tell_of_unknown(table)
+            with heard() as said:
+                ready = prepare(table)
+            for level, text in said:
+                if text not in told:
+                    told.add(text)
+                    tell_as(level, text)
+            yield ready
+
+    nested = stream.rows > MOST_IN_ONE * wanted.pairs_per_part
+    _tell(
+        str(stream.path),
+        output,
+        Shard(*wanted.share),
+        _drawn(readies(), output, wanted, nested, stream.rows),
+    )
 
 
 def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
@@ -35,42 +86,125 @@ def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
     InputError
         No pair can be drawn.
     """
-    task, table, duration = ready.task, ready.table, ready.duration
+    table = ready.table
     if not table.good.any():
         raise InputError(f"{table.name}: no pair can be drawn; the first: {table.status[0]}")
-    drawable = table.pairs[table.good.nonzero()[0]]
-    seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
-    facts = ready.provenance.facts | trajectory.facts_of(seen, task.style, heights)
-    facts |= {"rate": task.style.rate}
+    nested = len(table) > MOST_IN_ONE * wanted.pairs_per_part
+    return _drawn(iter([ready]), output, wanted, nested, len(table))
+
+
+def _drawn(
+    readies: Iterator[Ready], output: Path, wanted: BatchOptions, nested: bool, total: int
+) -> Summary:
+    with _workers(wanted) as draw_with, progress("drawing", total) as advance:
+        return run(_batches(readies, output, wanted, nested), draw_with, advance)
+
+
+def _batches(
+    readies: Iterator[Ready], output: Path, wanted: BatchOptions, nested: bool
+) -> Iterator[Batch]:
+    """Yield what is to be drawn; all of it is one job, that of the first piece."""
+    job: Job | None = None
+    first_part = 0
+    for ready in readies:
+        own = replace(_job(ready, output, wanted), nested=nested)
+        if job is None:
+            job = own
+            _try(ready)
+        elif ready.table.good.any() and not _alike(job, own):
+            raise InputError(
+                f"{ready.table.name}: its pairs see the surface from two sides; draw them as "
+                "two tables"
+            )
+        surface = job.task.surface
+        batch = Batch(
+            job,
+            ready.table,
+            ready.table.pairs if surface is None else snapped(ready.table.pairs, surface),
+            ready.duration,
+            wanted.pairs_per_part,
+            Shard(*wanted.share),
+            ready.sites,
+            wanted.surfaces_per_part,
+            first_part,
+        )
+        first_part += batch.cut.count
+        yield batch
+
+
+def _job(ready: Ready, output: Path, wanted: BatchOptions) -> Job:
+    task, table = ready.task, ready.table
+    facts = ready.provenance.facts | {"rate": task.style.rate}
+    if ready.sites is None:
+        drawable = table.pairs[table.good.nonzero()[0]]
+        seen, heights = seen_from(task.skill, task.style, drawable, task.surface)
+        facts |= trajectory.facts_of(seen, task.style, heights)
     form = Form(wanted.float32, wanted.compression)
-    job = Job(task, wanted.stop, replace(ready.provenance, facts=facts), form, str(output))
-    pairs = table.pairs if task.surface is None else snapped(table.pairs, task.surface)
-    batch = Batch(job, table, pairs, duration, wanted.pairs_per_part, Shard(*wanted.share))
-    draw_with = _workers(wanted)
+    p = replace(ready.provenance, facts=facts)
+    return Job(task, wanted.stop, p, form, str(output), ready.prepare)
+
+
+def _alike(job: Job, other: Job) -> bool:
+    """Tell whether two pieces of one table are drawn alike."""
+    one, two = job.task.surface, other.task.surface
+    if isinstance(one, Plane) and isinstance(two, Plane) and one.normal @ two.normal < 0.0:
+        return False
+    return job.provenance.facts == other.provenance.facts
+
+
+def _try(ready: Ready) -> None:
+    """Draw a stroke: a skill that gives none must not cost an older batch."""
+    task, table = ready.task, ready.table
     first = table.good.nonzero()[0][:1]
+    pairs = table.pairs[first]
+    if not len(first):
+        return
     with about("skill"):
-        # A skill that gives no stroke must not cost an older batch.
-        draw(task.skill, pairs[first], duration[first], task.surface, task.style)
-    with progress("drawing", batch.count) as advance:
-        return batch.run(draw_with, advance)
+        pairs = pairs if task.surface is None else snapped(pairs, task.surface)
+        draw(task.skill, pairs, ready.duration[first], task.surface, task.style)
 
 
-def _workers(wanted: BatchOptions) -> Draw:
+@contextlib.contextmanager
+def _workers(wanted: BatchOptions) -> Iterator[Draw]:
     from dmpcli.batch import workers
 
     if wanted.cluster is not None:
         from dmpcli.batch import cluster
 
-        return cluster.workers(wanted.cluster)
-    if wanted.jobs > 1:
-        return workers.processes(wanted.jobs)
-    from dmpcli.batch import memory
+        with cluster.workers(wanted.cluster) as drawing:
+            yield drawing
+    elif wanted.jobs > 1:
+        processes = workers.Processes(wanted.jobs)
+        try:
+            yield processes
+        finally:
+            processes.close()
+    else:
+        yield workers.here
 
-    memory.keep()
-    return workers.here
+
+def tell_of_unknown(table: PairTable) -> None:
+    """Say once which columns of a table nobody reads."""
+    if table.unknown:
+        tell(
+            f"{table.name}: {', '.join(map(repr, table.unknown))}: no such column is known, and "
+            f"none is read but {', '.join(KNOWN)}"
+        )
 
 
-def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> None:
+def _tell_of_sites(told: SitesTold) -> None:
+    """Say what was odd about the surfaces of a table, once what was so for several."""
+    loud = sorted(told.first, key=lambda key: -key[0])
+    for level, text in loud[:SHOWN]:
+        more = told.count[level, text] - 1
+        name = told.first[level, text] + (f" and {more} more" if more else "")
+        tell_as(level, f"{name}: {text}")
+    if len(loud) > SHOWN:
+        tell(f"and {len(loud) - SHOWN} more remarks on surfaces")
+
+
+def _tell(name: str, output: Path, shard: Shard, summary: Summary) -> None:
+    _tell_of_sites(summary.told)
     if summary.unfolded:
         warn(
             f"{counted(summary.unfolded, 'stroke')} across a sharp crease, where no tool can "
@@ -82,11 +216,10 @@ def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> Non
         tell(f"{output}: {counted(summary.split, 'stroke')} {SPLIT}")
     if summary.kept:
         tell(f"{output}: {summary.kept} of {summary.parts} parts were there already")
-    bad = [status for status in table.status if status != OK]
-    for status in bad[:SHOWN]:
-        tell(f"{table.name}: skipped: {status}")
-    if len(bad) > SHOWN:
-        more = f"{table.name}: and {len(bad) - SHOWN} more"
+    for status in summary.skipped:
+        tell(f"{name}: skipped: {status}")
+    if summary.bad > len(summary.skipped):
+        more = f"{name}: and {summary.bad - len(summary.skipped)} more"
         tell(f"{more}; {output}/{file_io.TABLE} names all" if shard.whole else more)
     if not shard.whole:
         tell(
@@ -95,14 +228,14 @@ def _tell(table: PairTable, output: Path, shard: Shard, summary: Summary) -> Non
             "--shard writes the table and the manifest",
         )
         return
-    if len(bad) == len(table):
+    if summary.bad == summary.rows:
         raise RefusedError(
-            f"{table.name}: no pair can be drawn, {output}/{file_io.TABLE} says why of each; move "
+            f"{name}: no pair can be drawn, {output}/{file_io.TABLE} says why of each; move "
             "the pairs"
         )
-    drawn = len(table) - len(bad)
-    told = f"{output}: {counted(drawn, 'stroke')} drawn, {counted(len(bad), 'pair')} skipped"
-    if bad:
+    drawn = summary.rows - summary.bad
+    told = f"{output}: {counted(drawn, 'stroke')} drawn, {counted(summary.bad, 'pair')} skipped"
+    if summary.bad:
         warn(told)
     else:
         tell(told)

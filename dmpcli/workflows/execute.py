@@ -10,10 +10,12 @@ from dmpcli.control import (
     execution,
     execution_plan,
     guards,
+    outputs,
     ownership,
     preflight_table,
     stopping,
     stroke_file,
+    watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
@@ -23,7 +25,7 @@ from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
-from dmpcli.instruments.protocols import PlanPlayer
+from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
@@ -39,6 +41,7 @@ from dmpcli.workflows.run_output import (
     interruptible,
     refuse_replacing,
 )
+from dmpcli.workflows.told_later import ContactTeller
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ class ExecutionRequest:
         Check, and move nothing.
     allow_file_mode : bool
         Let the controller play the plan, though the arm draws on if the link is lost.
+    ignore_events : bool
+        Draw without switching the outputs that the file asks for.
     """
 
     trajectory: str | Source
@@ -88,6 +93,7 @@ class ExecutionRequest:
     force: bool = False
     dry_run: bool = False
     allow_file_mode: bool = False
+    ignore_events: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,8 +129,11 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    if not presses and "force_setpoint" in said:
-        raise InputError("--force-setpoint: nothing presses without --coupling force")
+    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+        if option in said and not presses:
+            raise InputError(
+                f"--{option.replace('_', '-')}: nothing presses without --coupling force"
+            )
     for option in ("max_force", "max_torque"):
         if option in said and not (feels or presses):
             raise InputError(
@@ -148,7 +157,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     repeatable = workcell.repeatable(addresses)
     check_output(request, repeatable)
     tool_file = None if request.tool is None else file_io.read(request.tool)
-    batch = stroke_file.find(request.trajectory, request.ids)
+    batch = _found(request)
     _warn_of(batch, _name(request.trajectory))
     coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
@@ -171,6 +180,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         tool=held,
     )
     guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
+    outputs.check(bench.robot, outputs.names_of(batch.strokes))
     if bench.note:
         tell(bench.note)
     robot = bench.robot
@@ -180,8 +190,9 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
+    teller = ContactTeller(realtime and request.presses and keeper is not None)
     try:
-        arm = ReadyArm(robot, robot.open(), clock)
+        arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
         if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
@@ -189,17 +200,19 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
         if keeper is None:
-            tell(preflight_table.table(judged))
+            tell(preflight_table.table(judged), preflight_table.facts(judged))
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
-        loop = _loop(bench, arm, judged, settings, request, coupling, tool_file, keeper)
+        loop = _loop(
+            bench, arm, judged, settings, request, coupling, tool_file, keeper, batch, teller
+        )
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
-        provenance.facts.update(execution.facts_of(arm, coupling, settings))
-        outcome, made = _stream(loop, provenance, realtime, keeper)
+        provenance.facts.update(execution.facts_of(arm, coupling))
+        outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
-        closing = guards.leave(robot.close, bench.sensor.close, lock.release)
+        closing = guards.leave(robot.close, bench.sensor.close, lock.release, teller.close)
     with stopping.outranking(lambda: outcome.stop):
         if realtime:
             tell(str(loop.timing))
@@ -212,6 +225,17 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         if closing is None and execution_plan.lifts(batch, settings):
             left = execution_plan.rest_of(batch, loop.drawn)
         return Execution(judged, _finished(outcome, made, request, left))
+
+
+def _found(request: ExecutionRequest) -> StrokeSelection:
+    """Return the strokes that are to be drawn, with the outputs that they are to switch."""
+    batch = stroke_file.find(request.trajectory, request.ids)
+    names = outputs.names_of(batch.strokes)
+    if not request.ignore_events:
+        return batch
+    if names:
+        warn(f"{', '.join(names)}: not switched, as --ignore-events asks")
+    return stroke_file.without_events(batch)
 
 
 def _name(trajectory: str | Source) -> str:
@@ -277,6 +301,8 @@ def _loop(
     coupling: Filter | None,
     tool_file: Source | None,
     keeper: RunOutput,
+    batch: StrokeSelection,
+    teller: ContactTeller,
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
@@ -284,14 +310,24 @@ def _loop(
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
-        touch = execution.touch(bench.sensor, tool, plans[0], settings, arm, coupling, check)
+        policy = None
+        if coupling is not None:
+            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+        touch = execution.touch(
+            bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller
+        )
     watch = execution.watch(settings)
     kind: type[PlanLoop] = ServoLoop
     if isinstance(arm.servo, PlanPlayer):
         from dmpcli.control.playback import Playback
 
         kind = Playback
-    return kind(plans[0], limits_of(settings), watch, arm, touch, keeper.hindrance, plans[1:])
+    switch = None
+    if any(plan.events for plan in plans):
+        assert isinstance(arm.servo, OutputSwitching)
+        switch = outputs.OutputSwitch(arm.servo, settings.period, arm.info.lookahead)
+    limits = limits_of(settings)
+    return kind(plans[0], limits, watch, arm, touch, keeper.hindrance, plans[1:], switch)
 
 
 def _tool(bench: Workcell, tool_file: Source | None) -> Tool:
@@ -321,6 +357,8 @@ def _provenance(
         "sensor": workcell.in_provenance(request.sensor),
     }
     options |= {"coupling": "force" if request.presses else None}
+    if request.ignore_events:
+        options["ignore_events"] = True
     facts: dict[str, Any] = {"simulated": simulated}
     if execution_plan.lifts(batch, settings):
         options["id"] = list(request.ids) or None
@@ -332,7 +370,11 @@ def _provenance(
 
 
 def _stream(
-    loop: PlanLoop, provenance: Provenance, realtime: bool, keeper: RunOutput
+    loop: PlanLoop,
+    provenance: Provenance,
+    realtime: bool,
+    keeper: RunOutput,
+    reach: Reach | None,
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
@@ -341,10 +383,12 @@ def _stream(
         if realtime:
             tell("streaming; Ctrl-C decelerates, a second one stops at once")
         try:
-            outcome = loop.run(interruption)
+            with watching.live(lambda: watching.of_plan(loop), realtime) as ended:
+                outcome = loop.run(interruption)
+                ended(outcome.reason)
         finally:
             if len(loop.log):
-                made = execution.record_of(loop, outcome, provenance, realtime)
+                made = execution.record_of(loop, outcome, provenance, realtime, reach)
                 keeper.keep(made, outcome.error())
             else:
                 keeper.drop()

@@ -13,7 +13,7 @@ from dmpcli.formats.motion import Motion
 from dmpcli.formats.registry import FileFormat
 from dmpcli.formats.toolpath import ProgramOptions
 from dmpcli.kinematics import models
-from dmpcli.messages import tell
+from dmpcli.messages import tell, warn
 from dmpcli.records import file_io, tool
 from dmpcli.settings.export import ExportOptions
 from dmpcli.spatial.rotations import from_euler
@@ -47,8 +47,6 @@ def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> 
     if alone:
         flag = f"--{alone[0].replace('_', '-')}"
         raise InputError(f"{flag}: says nothing of {chosen.word}; leave it out")
-    if chosen.word == "joints" and options.robot_model is None:
-        raise InputError("--format joints: of which arm? Name it, as in --robot-model ec66")
     if chosen.folder:
         file_io.check_folder(output)
     elif ID not in Path(output).name:
@@ -73,6 +71,12 @@ def export(motion: Motion, output: str | Path, chosen: FileFormat, options: Expo
         The format cannot hold them, or an arm cannot follow them.
     """
     prepared = _prepared(motion, chosen, options)
+    names = dict.fromkeys(event.output for one in prepared.strokes for event in one.events)
+    if names and not chosen.outputs:
+        warn(
+            f"{motion.name}: switches {', '.join(names)} on its way, of which {chosen.word} holds "
+            "nothing; urscript, krl and rapid do"
+        )
     name = Path(output).name
     if ID in name and not chosen.folder:
         for one in prepared.strokes:
@@ -102,12 +106,38 @@ def _prepared(motion: Motion, chosen: FileFormat, options: ExportOptions) -> Mot
     if rate is not None:
         motion = motions.evenly(motion, rate)
     if chosen.word == "joints":
-        from dmpcli.formats.joint_table import with_joints
-
-        assert options.robot_model is not None
-        held = None if options.tool is None else tool.geometry(file_io.read(options.tool))
-        motion = with_joints(motion, models.model(options.robot_model), held)
+        motion = _in_joints(motion, options)
     return motion
+
+
+def _in_joints(motion: Motion, options: ExportOptions) -> Motion:
+    """Return the motion with joint angles: those of the file, else by kinematics.
+
+    Raises
+    ------
+    InputError, RefusedError
+        Of no arm, of another one than the file's, or of one that cannot follow.
+    """
+    model, said = options.robot_model, motion.facts.get("joints")
+    if all(one.joints is not None for one in motion.strokes):
+        arm = said.get("arm") if isinstance(said, dict) else None
+        if model is not None and arm is not None and model != arm:
+            raise InputError(f"--robot-model {model}: {motion.name} holds the joints of an {arm}")
+        if options.tool is not None:
+            raise InputError(f"--tool: {motion.name} holds the joints themselves; leave it out")
+        measured = not isinstance(said, dict) or said.get("measured", True)
+        how = "as its controller told them" if measured else "by kinematics, no robot told them"
+        tell(f"{motion.name}: joint angles of the arm on its way, {how}")
+        return motion
+    if model is None:
+        raise InputError(
+            f"--format joints: {motion.name} holds no joint angles; of which arm are they to be? "
+            "Name it, as in --robot-model ec66"
+        )
+    from dmpcli.formats.joint_table import with_joints
+
+    held = None if options.tool is None else tool.geometry(file_io.read(options.tool))
+    return with_joints(motion, models.model(model), held)
 
 
 def _write(motion: Motion, output: str | Path, chosen: FileFormat, options: ExportOptions) -> None:

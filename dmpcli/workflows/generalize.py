@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dmpcli.arrays import Floats
-from dmpcli.batch.part import Task
+from dmpcli.arrays import Floats, Integers
+from dmpcli.batch.site import PairSites, Prepare
+from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions, OnBorder
-from dmpcli.dmp.feasibility import admit
+from dmpcli.dmp.feasibility import Feasibility, admit
 from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.messages import tell, warn
@@ -18,6 +19,8 @@ from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.settings.generalize import GeneralizeSettings
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import AskedEvent
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
@@ -89,12 +92,18 @@ class Ready:
     duration : array, shape (B,)
         Of each stroke without easing, s.
     provenance : Provenance
+    sites : PairSites, optional
+        Where the pairs lie, if the table says it; `task` then has no surface.
+    prepare : callable, optional
+        Makes those pairs ready, see `Job`.
     """
 
     task: Task
     table: PairTable
     duration: Floats
     provenance: Provenance
+    sites: PairSites | None = None
+    prepare: Prepare | None = None
 
 
 def prepared(order: Order) -> Ready:
@@ -116,10 +125,15 @@ def prepared(order: Order) -> Ready:
     table = order.table
     if order.in_ == "part":
         table, options = in_base(table, read), options | {"in": order.in_}
-    _check_asked(skill, table, settings)
+    check_asked(skill, table, settings)
     process.check_skill(settings, skill, table, order.keep_out)
     table = process.copied(table, settings)
     given = None if read is None else facing_tool(read.surface, skill, table, str(read.path))
+    if settings.force_setpoint is not None and settings.offset > 0.0:
+        raise InputError(
+            f"--force-setpoint: nothing presses at --offset {settings.offset:g} mm off the "
+            "surface; leave one of them out"
+        )
     style = style_of(settings.style(), skill, given, settings.contact, settings.offset)
     style = process.process_style(style, settings, order.on_border, given, order.keep_out, inputs)
     said = mark(skill, skill.name)
@@ -136,14 +150,27 @@ def prepared(order: Order) -> Ready:
     _judge(order, table, given, style)
     taught = learning_record.of_skill(skill.file).facts()
     return Ready(
-        Task(skill.plain(), given, style, reach),
+        Task(skill.plain(), given, style, reach, asked_events(settings)),
         table,
-        _durations(skill, table, settings),
+        durations(skill, table.duration, settings),
         Provenance("generalize", options, tuple(inputs), taught),
     )
 
 
-def _check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> None:
+def asked_events(settings: GeneralizeSettings) -> tuple[AskedEvent, ...]:
+    """Return what is switched along each stroke, and tell what stays on."""
+    events = output_events.asked(settings.event or ())
+    for name in dict.fromkeys(event.output for event in events):
+        own = [event for event in events if event.output == name]
+        if all(event.on for event in own):
+            warn(
+                f"{name} is switched on and never off: execute switches it off when a run ends, a "
+                f"robot program leaves it on; --event off@end:{name} has it off with the stroke"
+            )
+    return events
+
+
+def check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> None:
     """Refuse what this skill cannot give, rather than pass over it."""
     asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
     if not skill.oriented and any(rotation is not None for rotation in asked):
@@ -176,19 +203,15 @@ def _judge(order: Order, table: PairTable, given: Surface | None, style: General
     verdict = admit(
         skill,
         table.pairs[rows],
-        _durations(skill, table, settings)[rows],
+        durations(skill, table.duration, settings)[rows],
         style,
         given,
         settings.snap_tol,
     )
-    for i in np.flatnonzero(~verdict.admitted):
-        row = int(rows[i])
+    against = objections(verdict, table, rows, skill, settings, read, order.in_ == "part")
+    for row, said in against.items():
         place = f"{table.place(row)}, pair {table.ids[row]}: " if table.name != ENDS else ""
-        # To place each of very many would take longer than to draw them.
-        where = None
-        if read is not None and int(np.count_nonzero(verdict.far[:i])) < _PLACED:
-            where = where_instead(table, row, read, order.in_ == "part")
-        table.status[row] = place + reason(verdict, int(i), settings.snap_tol, skill, where)
+        table.status[row] = place + said
     bad = np.flatnonzero(~table.good)
     if order.stop and len(bad):
         shape = verdict.upright | verdict.deep | verdict.stretched
@@ -197,6 +220,41 @@ def _judge(order: Order, table: PairTable, given: Surface | None, style: General
     tell_of_stretch(verdict, np.flatnonzero(verdict.admitted), skill, table.name)
 
 
-def _durations(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> Floats:
+def objections(
+    verdict: Feasibility,
+    table: PairTable,
+    rows: Integers,
+    skill: Skill,
+    settings: GeneralizeSettings,
+    read: SurfaceInput | None,
+    in_part: bool,
+) -> dict[int, str]:
+    """Say what stands against pairs, by their rows.
+
+    Parameters
+    ----------
+    verdict : Feasibility
+        Of these rows (k,) of the table.
+    table : PairTable
+        In the base frame.
+    rows : array of int, shape (k,)
+    skill, settings
+    read : SurfaceInput, optional
+    in_part : bool
+        Whether the pairs were given in the surface's own axes.
+    """
+    said = {}
+    for i in np.flatnonzero(~verdict.admitted):
+        row = int(rows[i])
+        # To place each of very many would take longer than to draw them.
+        where = None
+        if read is not None and int(np.count_nonzero(verdict.far[:i])) < _PLACED:
+            where = where_instead(table, row, read, in_part)
+        said[row] = reason(verdict, int(i), settings.snap_tol, skill, where)
+    return said
+
+
+def durations(skill: Skill, asked: Floats, settings: GeneralizeSettings) -> Floats:
+    """Return how long strokes last without easing, s; NaN is asked for where nothing is."""
     default = settings.duration or skill.duration
-    return np.where(np.isnan(table.duration), default, table.duration)
+    return np.where(np.isnan(asked), default, asked)

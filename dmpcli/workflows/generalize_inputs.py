@@ -62,8 +62,6 @@ def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
 
     import numpy as np
 
-    from dmpcli.dmp.rollout import Pairs
-
     pose = None if read is None else read.pose
     if pose is None:
         return table
@@ -73,11 +71,12 @@ def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
 
     pairs = table.pairs
     with np.errstate(invalid="ignore"):  # rows that are not read hold what they held
-        carried = Pairs(
-            pose.apply(pairs.start),
-            pose.apply(pairs.goal),
-            turned(pairs.start_rotation),
-            turned(pairs.goal_rotation),
+        carried = replace(
+            pairs,
+            start=pose.apply(pairs.start),
+            goal=pose.apply(pairs.goal),
+            start_rotation=turned(pairs.start_rotation),
+            goal_rotation=turned(pairs.goal_rotation),
         )
     return replace(table, pairs=carried)
 

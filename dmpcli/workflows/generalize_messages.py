@@ -160,13 +160,13 @@ def _tell_of_taught_side(skill: "Skill", given: "Surface", start: "Floats", name
         warn(
             f"{name}: the surface stands square to the one that the stroke was taught on, so that "
             "it may come out mirrored or on the other side; give the tool at the start, "
-            "--start X Y Z RX RY RZ"
+            "--start-orientation RX RY RZ"
         )
     elif (cosine < 0.0).any():
         tell(
             f"{name}: drawn on the side that the surface's own normals point away from, as the "
             "tool was when it was taught; for the other one give the tool at the start, "
-            "--start X Y Z RX RY RZ",
+            "--start-orientation RX RY RZ",
         )
 
 

@@ -15,11 +15,12 @@ from dmpcli.messages import tell
 from dmpcli.records import file_io, record, schemas, suffixes
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
+from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
 from dmpcli.settings.import_file import ImportOptions
 from dmpcli.spatial.rotations import interpolate, to_euler_continuous
-from dmpcli.workflows.recording import recording
+from dmpcli.workflows.recording import whole
 
 NAME, ID = "{name}", "{id}"
 """In the name of an output: the input's, without suffix, and that of each of its strokes."""
@@ -84,12 +85,16 @@ def import_file(
             f"{name}: holds {len(strokes)} strokes: {names}; choose one with --episode "
             f"NAME, or put {ID} into the name of the output for a file of each"
         )
+    for one in strokes:
+        if one.events:
+            tell(f"{name}: {_switched(one)}")
     said: dict[str, Any] = {"format": kind}
     if form is not None:
         said["layout"] = form.as_options()
     if kind != TABLE:
         said |= {k: v for k, v in options.as_options().items() if k in _OPTIONS[kind]}
     for one in strokes:
+        _check_place(one, name)
         place = output
         if output.name != file_io.DASH:
             own = output.name.replace(NAME, stem_of(file)).replace(ID, _safe(one.id))
@@ -97,6 +102,21 @@ def import_file(
         file_io.write(place, record.encode(demonstration(one, inputs, said)))
         shown = file_io.shown(place, output=True)
         tell(f"{shown}: {counted(len(one), 'sample')}, {one.duration:.3f} s, from {kind}")
+
+
+def _check_place(one: MotionStroke, name: str) -> None:
+    """Refuse a stroke that no reader of demonstrations would take.
+
+    Raises
+    ------
+    InputError
+    """
+    beyond = ~(np.abs(one.position) <= FARTHEST).all(axis=1)
+    if beyond.any():
+        raise InputError(
+            f"{name}: stroke {one.id}, sample {int(np.argmax(beyond)) + 1}: the position is beyond "
+            f"{FARTHEST:g} mm; check the units that its program wrote"
+        )
 
 
 def _read(
@@ -220,8 +240,9 @@ def strokes_of(
         It cannot be read.
     """
     if kind == TABLE:
-        stroke = recording(source, form)
-        return [MotionStroke(stroke.t, stroke.position, stroke.rotation)]
+        found = whole(source, form, wrench=True)
+        stroke = found.stroke
+        return [MotionStroke(stroke.t, stroke.position, stroke.rotation, wrench=found.wrench)]
     if kind == "svg":
         from dmpcli.formats import svg_paths
 
@@ -244,7 +265,11 @@ def strokes_of(
     return [sampled(one, options.rate, source.name) for one in strokes]
 
 
-MOST_SAMPLES = 5_000_000
+MOST_SAMPLES = 1_000_000
+"""Of a program: hours of it."""
+
+_AT_ONCE = 1 << 14
+"""Samples whose rotations are interpolated at once: what that takes in between is large."""
 
 
 def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
@@ -264,7 +289,7 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     InputError
         It takes too long.
     """
-    if one.duration * rate > MOST_SAMPLES:
+    if not one.duration * rate <= MOST_SAMPLES:
         raise InputError(
             f"{name}: takes {one.duration:.0f} s, too many samples; give a lower --rate"
         )
@@ -273,7 +298,12 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     t = np.interp(np.arange(ends[-1] + 1), ends, one.t)
     t = t[np.concatenate([[True], np.diff(t) > 0.0])]
     position = np.column_stack([np.interp(t, one.t, axis) for axis in one.position.T])
-    R = None if one.rotation is None else interpolate(one.t, np.asarray(one.rotation), t)
+    R = None
+    if one.rotation is not None:
+        R = np.empty((len(t), 3, 3))
+        for first in range(0, len(t), _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            R[part] = interpolate(one.t, np.asarray(one.rotation), t[part])
     return replace(one, t=t, position=position, rotation=R)
 
 
@@ -290,6 +320,20 @@ def demonstration(
         columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
     origin = Provenance("import", options, tuple(inputs))
     return Record(schemas.DEMONSTRATION, columns, origin)
+
+
+def _switched(one: MotionStroke) -> str:
+    """Say what a stroke switches, which no demonstration holds, and how to have it again."""
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(one.position, axis=0), axis=1))])
+    words = []
+    for event in one.events[:10]:
+        place = np.interp(event.t, one.t, gone)
+        words.append(f"--event {'on' if event.on else 'off'}@{place:.4f}mm:{event.output}")
+    more = "" if len(one.events) <= 10 else f" and {len(one.events) - 10} more"
+    return (
+        f"stroke {one.id!r} switches outputs, and a demonstration holds none: generalize "
+        f"{' '.join(words)}{more} does"
+    )
 
 
 def _safe(name: str) -> str:

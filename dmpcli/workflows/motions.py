@@ -12,11 +12,13 @@ from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.record import Record
-from dmpcli.records.schemas import EULER_ANGLES, NORMAL, WRENCH
+from dmpcli.records.schemas import EULER_ANGLES, JOINTS, NORMAL, WRENCH
 from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.reporting import tracking
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_euler, interpolate
-from dmpcli.workflows.recording import recording
+from dmpcli.workflows.recording import recording, whole
 
 BATCH = "batch"
 
@@ -52,8 +54,9 @@ def motion_in(path: Path, layout: Layout | None = None) -> tuple[Motion, dict[st
 def motion_of(source: Source, layout: Layout | None = None) -> Motion:
     """Return the strokes of a file; see `motion_in`."""
     if not record.is_ours(source):
-        stroke = recording(source, layout)
-        one = MotionStroke(stroke.t, stroke.position, stroke.rotation)
+        read = whole(source, layout, wrench=True)
+        stroke = read.stroke
+        one = MotionStroke(stroke.t, stroke.position, stroke.rotation, wrench=read.wrench)
         return Motion(source.name, schemas.DEMONSTRATION.name, [one])
     found = record.decode(source)
     if found.schema is schemas.DEMONSTRATION:
@@ -64,7 +67,9 @@ def motion_of(source: Source, layout: Layout | None = None) -> Motion:
         groups = rows_by_id(found.columns["id"])
         several = [stored(found, name, rows) for name, rows in groups.items()]
         strokes = [
-            MotionStroke(one.t, one.position, one.rotation, one.normal, id=one.id)
+            MotionStroke(
+                one.t, one.position, one.rotation, one.normal, id=one.id, events=one.events
+            )
             for one in several
         ]
     elif found.schema is schemas.RUN:
@@ -106,7 +111,7 @@ def run_strokes(run: Record) -> list[MotionStroke]:
         forward = np.concatenate([[True], np.diff(np.maximum.accumulate(t)) > 0.0])
         if forward.sum() < 2:
             continue
-        R, wrench = drawn.rotation(), _wrench(drawn)
+        R, wrench, joints = drawn.rotation(), _wrench(drawn), _joints(drawn)
         strokes.append(
             MotionStroke(
                 t[forward],
@@ -114,6 +119,8 @@ def run_strokes(run: Record) -> list[MotionStroke]:
                 None if R is None else R[forward],
                 id=name,
                 wrench=None if wrench is None else wrench[forward],
+                joints=None if joints is None else joints[forward],
+                events=_switched(run, begun + lookahead, t[forward]),
             )
         )
     if not strokes:
@@ -129,8 +136,42 @@ def _wrench(found: Record) -> Floats | None:
     return None if np.isnan(values).any() else values
 
 
+def _joints(found: Record) -> Floats | None:
+    """Joint angles of each row, shape (n, J), rad; None where they are not known throughout."""
+    names = [name for name in JOINTS if name in found.columns]
+    values = found.stack(names) if names else np.full((1, 1), np.nan)
+    return None if np.isnan(values).any() else values
+
+
+def _switched(run: Record, begun: float, t: Floats) -> tuple[OutputEvent, ...]:
+    """Return what a run switched while a stroke was drawn, on the stroke's own time."""
+    if schemas.EVENT not in run.columns:
+        return ()
+    when = np.asarray(run.columns["deadline"] + run.columns["lateness"], dtype=float) - begun
+    half = float(run.provenance.options.get("period", 0.0)) / 2.0
+    found: list[OutputEvent] = []
+    for row, text in enumerate(run.columns[schemas.EVENT].tolist()):
+        if text and t[0] - half <= when[row] <= t[-1] + half:
+            at = float(np.clip(when[row], t[0], t[-1]))
+            try:
+                found += output_events.read([text], np.array([at]))
+            except output_events.NotPlacedError as error:
+                raise InputError(f"{run.name}: column 'event', row {row + 1}: {error}") from None
+    return tuple(found)
+
+
+def _events(folder: Path, batch: dataset.BatchFolder) -> dict[str, tuple[OutputEvent, ...]]:
+    """Return what the strokes of a batch switch, by their ids; nothing where none was asked for."""
+    found: dict[str, tuple[OutputEvent, ...]] = {}
+    for name in batch.files if batch.provenance.options.get("event") else ():
+        part = record.decode(file_io.read(folder / name), schemas.TRAJECTORY)
+        for key, rows in rows_by_id(part.columns["id"]).items():
+            found[key] = stored(part, key, rows).events
+    return found
+
+
 def _batch(folder: Path, batch: dataset.BatchFolder) -> Motion:
-    strokes = []
+    strokes, events = [], _events(folder, batch)
     for piece in dataset.pieces(batch, (*EULER_ANGLES, *NORMAL)):
         columns = piece.columns
         position = np.column_stack([columns[n] for n in "xyz"])
@@ -152,6 +193,7 @@ def _batch(folder: Path, batch: dataset.BatchFolder) -> Motion:
                     None if angles is None else from_euler(angles[at]),
                     normal,
                     id=str(batch.ids[row].as_py()),
+                    events=events.get(str(batch.ids[row].as_py()), ()),
                 )
             )
     if not strokes:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from dmpcli.errors import InputError, counted
 from dmpcli.messages import tell, warn
+from dmpcli.spatial import output_events
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,7 @@ def check(
     InputError
         Names the options.
     """
+    output_events.asked(settings.event or ())
     if settings.inclination is not None and given.get("orientation") == "keep":
         raise InputError(
             "--lead and --tilt lean the tool off the surface's normal, with which --orientation "
@@ -121,10 +123,11 @@ def copied(table: "PairTable", settings: "GeneralizeSettings") -> "PairTable":
     InputError
         An id of the table looks like that of a copy.
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from dmpcli.dmp import copies
-    from dmpcli.records.pairs import PairTable
 
     count = settings.copies
     if count is None:
@@ -135,13 +138,15 @@ def copied(table: "PairTable", settings: "GeneralizeSettings") -> "PairTable":
             f"{table.name}: column 'id': some names are those that copies of others get, ID_0, "
             "ID_1 and so on; rename them"
         )
-    return PairTable(
-        table.name,
-        ids,
-        copies.copied(table.pairs, count, settings.spacing or 0.0),
-        None if table.lines is None else np.repeat(table.lines, count),
-        np.repeat(table.duration, count),
-        [status for status in table.status for _ in range(count)],
+    places = table.places
+    return replace(
+        table,
+        ids=ids,
+        pairs=copies.copied(table.pairs, count, settings.spacing or 0.0),
+        lines=None if table.lines is None else np.repeat(table.lines, count),
+        duration=np.repeat(table.duration, count),
+        status=[status for status in table.status for _ in range(count)],
+        places=None if places is None else replace(places, of=np.repeat(places.of, count)),
     )
 
 

@@ -1,18 +1,17 @@
 """`record`: one stroke that a hand drags the tool along, on the mock or on real instruments."""
 
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dmpcli.control import keyboard, ownership, stopping, workcell
+from dmpcli.control import keyboard, ownership, stopping, watching, workcell
 from dmpcli.control.cycle import LoopOutcome
 from dmpcli.control.drag_loop import DEFECT, Recorder
 from dmpcli.control.watchdog import watched
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
-from dmpcli.messages import status, tell, warn
+from dmpcli.messages import tell, warn
 from dmpcli.records import file_io, suffixes
 from dmpcli.records import tool as tool_file
 from dmpcli.records.file_io import Source
@@ -137,8 +136,11 @@ def record(
         keeper.begin(recorder.log.rows, DEMONSTRATION, provenance)
         with stopping.outranking(lambda: recorder.stop_outcome):
             try:
-                with status("recording; Enter ends it") if realtime else nullcontext():
+                if realtime:
+                    tell("recording; Enter ends it")
+                with watching.live(lambda: _view(recorder, settings), realtime) as ended:
                     outcome = recorder.run()
+                    ended(_ending(outcome))
             finally:
                 if len(recorder.log):
                     made = _recording(recorder, provenance, outcome, realtime)
@@ -215,14 +217,28 @@ def _recording(
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))
 
 
-def _summary(output: str | None, recorder: Recorder, outcome: LoopOutcome) -> str:
+def _view(recorder: Recorder, settings: RecordSettings) -> watching.RunView:
+    """What is seen of a recording while it goes on; of its end only what a duration says."""
+    whole = settings.duration
+    return watching.RunView(
+        "recording",
+        recorder.log.rows,
+        1.0 / settings.control_rate,
+        lambda t: None if whole is None else min(t / whole, 1.0),
+    )
+
+
+def _ending(outcome: LoopOutcome) -> str:
     endings = {
         "duration": "its time was over",
         "rest": "the tool came to rest",
         "asked": "it was asked to end",
     }
-    name = "recording" if output is None else file_io.shown(output, output=True)
     unless = "an instrument or a limit stopped it" if outcome.failure else "a signal came"
-    why = endings.get(outcome.reason, unless)
+    return endings.get(outcome.reason, unless)
+
+
+def _summary(output: str | None, recorder: Recorder, outcome: LoopOutcome) -> str:
+    name = "recording" if output is None else file_io.shown(output, output=True)
     log = recorder.log
-    return f"{name}: {len(log)} rows, {log.duration:.2f} s; ended because {why}"
+    return f"{name}: {len(log)} rows, {log.duration:.2f} s; ended because {_ending(outcome)}"

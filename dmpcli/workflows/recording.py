@@ -10,12 +10,12 @@ from dmpcli.spatial.trajectory import Trajectory
 
 def recording(source: Source, layout: Layout | None) -> Trajectory:
     """Read a recording, and say how it was read and what is doubtful about it."""
-    return read(source, layout).stroke
+    return whole(source, layout).stroke
 
 
-def read(source: Source, layout: Layout | None) -> Recording:
-    """Read a recording likewise, with what its file says of its clock."""
-    found = recordings.read(source, layout)
+def whole(source: Source, layout: Layout | None, wrench: bool = False) -> Recording:
+    """Read a recording with all that was said of it, which is told; see `recordings.read`."""
+    found = recordings.read(source, layout, wrench)
     if found.ours and layout is not None:
         tell(
             f"{source.name}: is dmpcli's own and tells its columns and units; options were not used"

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, about
 from dmpcli.messages import progress, tell, warn
@@ -36,6 +38,7 @@ from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows import recording
+from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
 
 if TYPE_CHECKING:
@@ -95,6 +98,7 @@ def report(
     layout: Layout | None,
     read: SurfaceInput | None,
     output: Path | None,
+    grounds: SiteGrounds | None = None,
     paper: bool = False,
     view: bool = False,
     png: bool = False,
@@ -114,6 +118,8 @@ def report(
         What the strokes lie on.
     output : Path, optional
         Folder of the page, JSON, CSV and figures.
+    grounds : SiteGrounds, optional
+        What the strokes of batches lie on, each on its own.
     paper : bool
         Whether to set the paper's tables beside ours and to draw its figures instead of ours.
     view : bool
@@ -126,19 +132,25 @@ def report(
     InputError
         One cannot be read, or holds nothing to report.
     """
-    ground = said = normal = None
+    ground = normal = None
+    said = None if grounds is None else grounds.said
     if read is not None:
         ground, said, normal = _ground(read)
     files = [each.name if isinstance(each, Source) else each for each in inputs]
     labels = labels_of(files) if names is None else names
-    parts = [_part(each, label, normal, layout) for each, label in zip(inputs, labels, strict=True)]
+    parts = [
+        _part(each, label, normal, layout, grounds)
+        for each, label in zip(inputs, labels, strict=True)
+    ]
     parts = _seen(parts, ground)
     if ground is not None:
         parts = _placed(parts, ground)
+    if grounds is not None:
+        parts = _placed_apart(parts, grounds)
     if read is not None:
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
-        sight = MeasurementContext(reference_of(parts), ground, normal)
+        sight = MeasurementContext(reference_of(parts), ground, normal, grounds=grounds)
         parts = _measured(parts, sight, tables)
         if not paper:
             parts = _compared(parts)
@@ -153,11 +165,15 @@ def report(
 
 
 def _part(
-    given: str | Source, label: str, normal: Floats | None, form: Layout | None
+    given: str | Source,
+    label: str,
+    normal: Floats | None,
+    form: Layout | None,
+    grounds: SiteGrounds | None,
 ) -> DocumentPart:
     """Read one input, whatever it is; how recordings are seen, all of them together tell."""
     if isinstance(given, str) and given != file_io.DASH and Path(given).is_dir():
-        return _batch(Path(given), label, normal)
+        return _batch(Path(given), label, normal, grounds)
     source = given if isinstance(given, Source) else file_io.read(given)
     if source.content.lstrip()[:1] == b"{":
         learned, file = skills.decode(source)
@@ -167,7 +183,7 @@ def _part(
         return DocumentPart(label, source.sha256, skills.SCHEMA, pupil=pupil, origin=origin)
     found = records.decode(source) if records.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        seen = recording.read(source, None if found else form)
+        seen = recording.whole(source, None if found else form)
         kind = "recording" if found is None else "demonstration"
         recorded = Recorded(
             seen.stroke, label, source.name, source.sha256, normal, began=seen.began
@@ -183,11 +199,15 @@ def _part(
     return DocumentPart(label, source.sha256, name, strokes, run, states=states, origin=origin)
 
 
-def _batch(folder: Path, label: str, normal: Floats | None) -> DocumentPart:
+def _batch(
+    folder: Path, label: str, normal: Floats | None, grounds: SiteGrounds | None
+) -> DocumentPart:
     """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
     batch, odd = dataset.read(folder)
     for remark in odd:
         tell(remark)
+    if grounds is not None:
+        grounds.belongs(batch)
     if len(batch) > MOST_ROWS:
         with about(str(folder)):
             drawn_by = learning_record.of_facts(dataset.facts_of(batch))
@@ -201,13 +221,14 @@ def _batch(folder: Path, label: str, normal: Floats | None) -> DocumentPart:
         )
     pairs = records.decode(file_io.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
-    strokes = []
+    strokes, ids = [], []
     for name in batch.files:
         part = records.decode(file_io.read(folder / name), schemas.TRAJECTORY)
         with about(part.name):
             strokes += strokes_of(part, label, normal, known)
+        ids += list(dict.fromkeys(part.columns["id"]))
     name, origin = schemas.PAIRS.name, pairs.provenance
-    return DocumentPart(label, pairs.sha256, name, strokes, states=states, origin=origin)
+    return DocumentPart(label, pairs.sha256, name, strokes, states=states, ids=ids, origin=origin)
 
 
 def _ground(read: SurfaceInput) -> tuple[ReportSurface, Row, Floats | None]:
@@ -252,6 +273,23 @@ def _placed(parts: list[DocumentPart], ground: ReportSurface) -> list[DocumentPa
                 strokes += placed(some, ground, reference)
                 advance(len(some))
             done.append(replace(part, strokes=strokes))
+    return done
+
+
+def _placed_apart(parts: list[DocumentPart], grounds: SiteGrounds) -> list[DocumentPart]:
+    """Measure how the strokes of small batches lie on their own surfaces."""
+    reference = reference_of(parts)
+    done = []
+    for part in parts:
+        strokes = list(part.strokes)
+        if part.ids:
+            on = grounds.of(part.ids)
+            for number in np.unique(on).tolist():
+                rows = np.flatnonzero(on == number).tolist()
+                some = placed([strokes[i] for i in rows], grounds.ground(number), reference)
+                for i, one in zip(rows, some, strict=True):
+                    strokes[i] = one
+        done.append(replace(part, strokes=strokes))
     return done
 
 

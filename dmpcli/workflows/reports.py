@@ -82,7 +82,7 @@ def report(
                 inputs.append(source)
                 called.append(_free(source.name, called))
         named = names or labels_of(called)
-        return reporting.report(inputs, named, layout, on, folder, paper, view, png)
+        return reporting.report(inputs, named, layout, on, folder, None, paper, view, png)
 
 
 def inspect(file: str | Path | Any) -> dict[str, Any]:

@@ -70,7 +70,9 @@ def draw_one(ready: Ready) -> DrawnPair:
     else:
         facts |= trajectory.facts_of_several(strokes[0], task.style.rate)
     ids = [name for one in settled for name in one.ids]
-    record = trajectory.trajectory_record(ids, strokes, replace(ready.provenance, facts=facts))
+    events = [switched for one in settled for switched in one.events]
+    origin = replace(ready.provenance, facts=facts)
+    record = trajectory.trajectory_record(ids, strokes, origin, events)
     if given is not None:
         moved = np.linalg.norm(
             [pairs.start - table.pairs.start, pairs.goal - table.pairs.goal], axis=2

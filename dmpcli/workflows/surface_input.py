@@ -11,6 +11,7 @@ from dmpcli.errors import InputError
 
 if TYPE_CHECKING:
     from dmpcli.records.file_io import Source
+    from dmpcli.records.mesh_store import MeshStore
     from dmpcli.records.pose import PoseFile
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.surface import Surface
@@ -106,40 +107,89 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
     from dmpcli.records import file_io
     from dmpcli.records import mesh as mesh_file
     from dmpcli.records import pose as pose_file
-    from dmpcli.records import surface as surface_file
-    from dmpcli.records.mesh import MeshFile
-    from dmpcli.surfaces.mesh import Mesh
-    from dmpcli.workflows.pose_hints import warn_of_angles
 
     source = file_io.read(path)
+    placed = None if pose is None else pose_file.parse(pose, "--surface-pose")
+    waiting = mesh_file.waiting(source)
+    if waiting is not None:
+        tell(waiting)
+    return placed_input(source, pose, placed, unit, summary=summary)
+
+
+def placed_input(
+    source: "Source",
+    pose: str | None,
+    placed: "tuple[Pose, Source | None] | None",
+    unit: str | None,
+    option: str = "--surface-pose",
+    store: "MeshStore | None" = None,
+    summary: bool = False,
+) -> SurfaceInput:
+    """Return a surface that was read, placed in the base frame; say what is odd about it.
+
+    Parameters
+    ----------
+    source : Source
+    pose : str, optional
+        As it was given.
+    placed : tuple of Pose and Source, optional
+        The pose, and its file if it came from one; see `pose.parse`.
+    unit : str, optional
+        Of a mesh file's lengths; without it mm.
+    option : str
+        What messages call a pose of six numbers.
+    store : MeshStore, optional
+        Where prepared meshes are kept.
+    summary : bool
+        As in `read`.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    from dmpcli.messages import tell
+    from dmpcli.records import mesh as mesh_file
+    from dmpcli.records import pose as pose_file
+    from dmpcli.records import surface as surface_file
+    from dmpcli.records.mesh_store import MeshStore
+    from dmpcli.workflows.pose_hints import warn_of_angles
+
     inputs = [{"role": "surface", "sha256": source.sha256}]
     options: dict[str, Any] = {}
-    placed, said = None, []
-    if pose is not None:
-        placed, pose_source = pose_file.parse(pose, "--surface-pose")
+    at, said = None, []
+    if placed is not None:
+        at, pose_source = placed
         if pose_source is None:
+            assert pose is not None
             said = options["surface_pose"] = [float(word) for word in pose.split()]
         else:
             inputs.append({"role": "surface-pose", "sha256": pose_source.sha256})
             _, file = pose_file.decode(pose_source)
             said = [*file.position, *file.rotation]
             unit = _agreed(pose_source.name, file, source, unit)
-        warn_of_angles("--surface-pose" if pose_source is None else pose_source.name, said[3:])
-    waiting = mesh_file.waiting(source)
-    if waiting is not None:
-        tell(waiting)
-    found = surface_file.load(source, unit, placed)
+        warn_of_angles(option if pose_source is None else pose_source.name, said[3:])
+    found = (store or MeshStore()).load(source, unit, at)
     shape: Surface
-    if isinstance(found, MeshFile):
-        for remark in found.remarks:
-            tell(f"{path}: {remark}")
-        kind, shape = surface_file.MESH, Mesh(found.V, found.F)
+    if isinstance(found, tuple):
+        mesh, shape = found
+        for remark in mesh.remarks:
+            tell(f"{source.name}: {remark}")
+        kind = surface_file.MESH
         if summary:
-            tell(f"{path}: {mesh_file.summary(found, shape)}")
+            tell(f"{source.name}: {mesh_file.summary(mesh, shape)}")
     else:
         kind, shape = surface_file.kind(found), found
     return SurfaceInput(
-        path, shape, kind, source.sha256, unit or "mm", placed, options, inputs, said
+        Path(source.name),
+        shape,
+        kind,
+        inputs[0]["sha256"],
+        unit or "mm",
+        at,
+        options,
+        inputs,
+        said,
     )
 
 

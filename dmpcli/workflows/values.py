@@ -67,7 +67,15 @@ class DrawnTrajectory(StoredTrajectory):
 
 @dataclass(frozen=True)
 class Run(Trajectory):
-    """What an arm did; the record holds what was planned and sent, and when."""
+    """What an arm did; the record holds what was planned and sent, and when.
+
+    Attributes
+    ----------
+    joints : array, shape (T, J), or None
+        Actual joint angles, rad, where the file holds them.
+    """
+
+    joints: Floats | None = None
 
     record: Record | None = field(default=None, repr=False, compare=False)
     source: Source | None = field(default=None, repr=False, compare=False)
@@ -134,6 +142,8 @@ def of_record(found: Record, source: Source | None = None) -> DrawnTrajectory | 
         one.id,
         one.first_row,
         one.facts,
+        one.events,
+        one.force,
         found,
         source,
     )
@@ -141,7 +151,11 @@ def of_record(found: Record, source: Source | None = None) -> DrawnTrajectory | 
 
 def of_run(found: Record, source: Source | None = None) -> Run:
     """Return what an arm did as a value."""
-    return Run(found.t, found.position(), found.rotation(), record=found, source=source)
+    names = [name for name in schemas.JOINTS if name in found.columns]
+    joints = found.stack(names) if names else None
+    return Run(
+        found.t, found.position(), found.rotation(), joints=joints, record=found, source=source
+    )
 
 
 def batch_in(folder: Path) -> TrajectoryBatch:
@@ -245,6 +259,8 @@ def record_of(one: Trajectory) -> Record:
     if one.normal is not None:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
         columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
+    if isinstance(one, StoredTrajectory) and one.force is not None:
+        columns["fn"] = one.force
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
 
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.admittance.compensation import Compensation, LowPass
 from dmpcli.admittance.payload_identification import (
+    Identification,
     PayloadEstimate,
     check_orientations,
     condition,
@@ -274,3 +275,11 @@ def test_the_residuals_are_those_that_compensation_leaves():
     left = Compensation(tool_with(found.payload))(readings, R)
     back = np.swapaxes(R, -1, -2)
     np.testing.assert_allclose(np.matvec(back, left[:, :3]), found.residual[:, :3], atol=1e-12)
+
+
+def test_residuals_are_told_as_lengths_of_forces_and_torques_of_the_poses_used():
+    residual = np.array([[3.0, 4, 0, 0, 0, 1], [0, 0, 5, 0, 7, 0], [90.0] * 6, [6, 8, 0, 0, 3, 4]])
+    used = np.array([True, True, False, True])
+    found = Identification(TRUTH, TRUTH, residual, np.ones(2), used)
+    assert found.rms == pytest.approx([np.sqrt(150 / 3), np.sqrt(75 / 3)])
+    assert found.largest.tolist() == [10.0, 7.0]

@@ -224,7 +224,6 @@ def test_pairs_without_trajectory_are_named_and_the_others_drawn(tmp_path):
         (("--id", "a", "--id", "f"), 2, "pair f has no trajectory: pair f: 3 mm off"),
         (("--id", "a", "--id", "a"), 2, "--id a: is given twice"),
         (("--clearance", 0.5), 2, "--clearance"),
-        (("--clearance", 4, "--coupling", "force"), 2, "must be over 5 mm"),
         (("--transfer-speed", 0), 2, "--transfer-speed"),
         (("--workspace", -900, 0, -500, 500, -100, 0), 3, "in the"),
         (("--robot", "mock:?x=-400"), 3, "over the work with --approach"),

@@ -1,11 +1,14 @@
 """``dmpcli export``: what each kind of file gives, and what is refused."""
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
 from dmpcli.formats.registry import FORMATS
+from dmpcli.kinematics.chain import forward
+from dmpcli.kinematics.models import model
 from dmpcli.records import record
 from dmpcli.records.file_io import read as read_file
 from dmpcli.settings.export import WORDS
@@ -102,6 +105,39 @@ def test_an_arms_joints_leave_by_their_suffix(files, tmp_path):
     done = run("export", files / "t.parquet", "-o", path)
     assert done.exit_code == 2
     assert "--robot-model ec66" in done.stderr
+
+
+def test_a_run_leaves_with_the_joints_that_its_file_holds(files, tmp_path):
+    """By kinematics of the mock's own poses; forward again they are these poses."""
+    ran = tmp_path / "r.parquet"
+    assert run("execute", files / "t.parquet", "-o", ran, "--robot-model", "ec66").exit_code == 0
+    held = record.decode(read_file(ran))
+    assert held.provenance.facts["joints"] == {"arm": "ec66", "measured": False}
+    q = held.stack([f"q{i}" for i in range(1, 7)])
+    place, turn = forward(model("ec66"), q)
+    np.testing.assert_allclose(place, held.position(), atol=1e-6)
+    np.testing.assert_allclose(turn, held.rotation(), atol=1e-8)
+    done = run("export", ran, "-o", tmp_path / "o.joints.csv")
+    assert done.exit_code == 0, done.stderr
+    assert "by kinematics, no robot told them" in done.stderr
+    left = table(tmp_path / "o.joints.csv")
+    poses = run("export", ran, "-o", tmp_path / "o.csv")
+    assert poses.exit_code == 0
+    drawn = table(tmp_path / "o.csv")
+    np.testing.assert_array_equal(left["t [s]"], drawn["t [s]"])
+    again = forward(model("ec66"), np.column_stack([left[f"q{i} [rad]"] for i in range(1, 7)]))[0]
+    np.testing.assert_allclose(
+        again, np.column_stack([drawn[f"{n} [mm]"] for n in "xyz"]), atol=1e-6
+    )
+    other = run("export", ran, "-o", tmp_path / "p.joints.csv", "--robot-model", "ur5e")
+    assert other.exit_code == 2
+    assert "holds the joints of an ec66" in other.stderr
+    done = run("export", ran, "-o", tmp_path / "set", "--format", "lerobot")
+    assert done.exit_code == 0, done.stderr
+    [episode] = (tmp_path / "set" / "data").rglob("*.parquet")
+    wide = np.array(pq.read_table(episode)["observation.joints"].to_pylist())
+    assert wide.shape == (len(wide), 6)
+    assert np.abs(wide[0] - [left[f"q{i} [rad]"][0] for i in range(1, 7)]).max() < 1e-6
 
 
 def test_another_programs_recording_leaves_too(tmp_path):

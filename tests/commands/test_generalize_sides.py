@@ -64,7 +64,7 @@ def test_where_the_taught_side_is_not_decided_or_not_the_surfaces_own_it_is_told
     assert done.exit_code == 0, done.stderr
     assert ("mirrored" in done.stderr) == (word == "warning")
     assert ("normals point away from" in done.stderr) == (word == "away from")
-    assert ("--start X Y Z RX RY RZ" in done.stderr) == (word is not None)
+    assert ("--start-orientation RX RY RZ" in done.stderr) == (word is not None)
     if word != "warning":
         drawn = record.decode(file_io.read(out))
         assert drawn.columns["nz"][0] > 0.9  # to where the tool came from

@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
-from dmpcli.extras import SVG
+from dmpcli.extras import ROS, SVG
+from dmpcli.formats import mcap_file
 from dmpcli.records import record, schemas
 from dmpcli.records.file_io import read as read_file
 from tests.extras_here import needs
@@ -174,3 +175,48 @@ def test_what_does_not_fit_is_refused(tmp_path, name, text, options, words):
     assert done.exit_code == 2, done.stderr
     assert words in done.stderr
     assert not (tmp_path / "d.parquet").exists()
+
+
+@needs(ROS)
+def test_a_place_that_no_reader_of_demonstrations_takes_is_refused(tmp_path):
+    one = wave()
+    one.position[3, 2] = 1e12
+    (tmp_path / "o.mcap").write_bytes(mcap_file.encode(motion(one)))
+    done = run("import", tmp_path / "o.mcap", "-o", tmp_path / "b.parquet")
+    assert done.exit_code == 2
+    assert "sample 4: the position is beyond" in done.stderr
+    assert not (tmp_path / "b.parquet").exists()
+
+
+def test_a_program_of_days_is_refused_with_the_rate_that_would_do(tmp_path):
+    path = tmp_path / "o.ngc"
+    path.write_text("G21 G90\nG1 X0 Y0 F1e-3\nG1 X900 Y0\n")
+    done = run("import", path, "-o", tmp_path / "b.parquet")
+    assert done.exit_code == 2
+    assert "lower --rate" in done.stderr
+
+
+def test_the_wrench_of_an_exported_table_comes_back(tmp_path):
+    felt = np.column_stack([np.sin(T + i) for i in range(6)])
+    columns = dict(zip("xyz", XYZ.T, strict=True)) | {"t": T}
+    columns |= dict(zip(schemas.WRENCH, felt.T, strict=True))
+    made = record.Record(schemas.DEMONSTRATION, columns, record.Provenance("record"))
+    there, table_, back = (tmp_path / name for name in ("d.parquet", "d.csv", "b.parquet"))
+    there.write_bytes(record.encode(made))
+    assert run("export", there, "-o", table_).exit_code == 0
+    done = run("import", table_, "-o", back)
+    assert done.exit_code == 0, done.stderr
+    assert "read as the wrench on the tool, at the TCP, in base axes" in done.stderr
+    np.testing.assert_allclose(imported(back).stack(schemas.WRENCH), felt, atol=1e-12)
+    again = run("export", table_, "-o", tmp_path / "e.csv")
+    assert again.exit_code == 0
+    assert (tmp_path / "e.csv").read_bytes() == table_.read_bytes()
+
+
+def test_a_wrench_whose_units_are_not_said_is_not_taken_and_that_is_told(tmp_path):
+    path = tmp_path / "d.csv"
+    path.write_text(table("t,x,y,z,fx,fy,fz,tx,ty,tz", T, *XYZ.T, *[0 * T] * 6))
+    done = run("import", path, "-o", tmp_path / "b.parquet")
+    assert done.exit_code == 0
+    assert "fx ... tz are not read: [N] and [N·m] in their names" in done.stderr
+    assert not imported(tmp_path / "b.parquet").has(*schemas.WRENCH)

@@ -1,6 +1,7 @@
 """``dmpcli inspect`` through the real command line: ours, damaged, and from elsewhere."""
 
 import json
+import shlex
 from functools import partial
 
 import jsonschema
@@ -10,7 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.commands.running import invoke
+from tests.records.foreign import XYZ, R, T, table
 from tests.records.meshes import box, grid, obj, written
+from tests.records.test_foreign_recordings import FILES
 from tests.reporting.example_files import demonstration, paper_files, put, trajectory, wave
 
 dmpcli = partial(invoke, "inspect")
@@ -105,7 +108,7 @@ def test_a_foreign_table_tells_how_fit_could_read_it(tmp_path):
     told = found(other)
     assert told["format"] == "Parquet"
     assert [column["missing"] for column in told["columns"]][:3] == [0, 1, 0]
-    assert "as it is" in dmpcli(other).stdout
+    assert "fit refuses it: column 'x', row 2: an empty cell" in dmpcli(other).stdout
 
 
 @pytest.mark.parametrize("name", ["skill", "plane", "tool"])
@@ -243,3 +246,64 @@ def test_a_file_larger_than_memory_is_refused_before_it_is_read(tmp_path):
     result = dmpcli(path)
     assert result.exit_code == 2
     assert "part.stl: has 3.0 GiB, more than the 2 GiB" in result.stderr
+
+
+def test_a_recording_tells_what_fit_reads_and_would_trim_and_how(tmp_path):
+    """5 s of rest, the wave in 8 s, 3 s of rest; a gap of 0.2 s on the way."""
+    names = "timestamp," + ",".join(f"actual_TCP_pose_{i}" for i in range(6))
+    before, after = np.arange(0.0, 5.0, 0.04), 13.0 + np.arange(0.04, 3.0, 0.04)
+    t = np.concatenate([before, 5.0 + T, after])
+    ends = [1 + len(before), *[1] * (len(T) - 2), 1 + len(after)]
+    way, turn = np.repeat(XYZ, ends, axis=0), np.repeat(R.as_rotvec(), ends, axis=0)
+    keep = np.ones(len(t), dtype=bool)
+    keep[200:204] = False
+    log = tmp_path / "log.csv"
+    log.write_text(table(names, t[keep], *(way[keep] / 1000).T, *turn[keep].T))
+    told = found(log)["recording"]
+    assert told["rows"] == keep.sum()
+    assert told["rate"] == pytest.approx(25.0)
+    assert told["duration"] == pytest.approx(t[-1])
+    [gap] = told["gaps"]
+    assert gap["seconds"] == pytest.approx(0.2)
+    assert gap["at"] == pytest.approx(t[199])
+    size = np.subtract(told["largest"], told["least"])
+    np.testing.assert_allclose(size, np.ptp(XYZ, axis=0), atol=1e-3)
+    assert told["orientation"]["lean"] == pytest.approx(0.0, abs=1e-3)
+    turned = np.degrees((R * R[0].inv()).magnitude().max())
+    assert told["orientation"]["turn"] == pytest.approx(turned, abs=1e-3)
+    assert told["fit"]["before"] == pytest.approx(5.0, abs=0.5)
+    assert told["fit"]["after"] == pytest.approx(3.0, abs=0.5)
+    assert told["told"][0].startswith("recognised as --layout ur")
+    assert told["command"].endswith("log.csv -o skill.json")
+    text = dmpcli(log).stdout
+    for words in ("1 gap: 0.2 s at", "extent 110.0 48.0 0.0 mm", "fit would trim", "leans 0.0°"):
+        assert words in text
+    assert max(map(len, text.splitlines()[:6])) <= 80
+
+
+def test_the_command_that_inspect_prints_is_the_one_that_reads(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text(table("clock,a,b,c", 1000 * T, *XYZ.T))
+    options = ["--map", "t=clock", "--map", "x=a", "--map", "y=b", "--map", "z=c"]
+    assert "t" in found(log)["recording"]["refused"]
+    told = found(log, *options, "--time-unit", "ms")["recording"]
+    words = shlex.split(told["command"])
+    assert words[:2] == ["dmpcli", "fit"]
+    words[words.index("skill.json")] = tmp_path / "skill.json"
+    assert invoke(*words[1:]).exit_code == 0
+
+
+def test_our_own_demonstrations_are_read_likewise(tmp_path):
+    told = found(put(tmp_path, "demo", demonstration()))["recording"]
+    assert told["rows"] == 501
+    assert told["rate"] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_every_known_recorder_is_inspected_by_its_word(tmp_path, name):
+    layout, text = FILES[name]
+    log = tmp_path / "log.csv"
+    log.write_text(text)
+    told = found(log, "--layout", layout)["recording"]
+    assert told["rows"] == len(T)
+    assert told["command"].endswith(f"--layout {layout}")

@@ -128,7 +128,9 @@ def rows_of(log):
     )
     ids = [word or None for word in rows.words("id")]
     columns = (t, t_plan, *poses, deadline, lateness, wrench, coupling)
-    words = (rows.words("state"), rows.words("phase"), ids)
+    force = rows.numbers("fn") if "fn" in rows.groups else np.zeros(count)
+    contact = rows.words("contact") if "contact" in rows.texts else [""] * count
+    words = (rows.words("state"), rows.words("phase"), ids, force, contact)
     return [Row(*row) for row in zip(*columns, *words, strict=True)]
 
 

@@ -1,16 +1,20 @@
 """Messages and facts of a run of many strokes stay short however many there are."""
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 
 from dmpcli.control import execution_plan
+from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.preflight import Check
 from dmpcli.settings.execute import ExecuteSettings
-from tests.control.streaming_fakes import plan, stroke
+from tests.control.streaming_fakes import START, FakeClock, FakeServo, plan, stroke
 
 
 def batch(*names, folder=True):
@@ -44,6 +48,18 @@ def test_of_a_thousand_that_fail_a_few_are_named():
     assert str(e.value).endswith("0, 0, 0, 0, 0 and 995 more")
 
 
+def test_the_others_that_fail_are_named_beside_the_first():
+    bad = Check("speed", 9.0, 1.0, "mm/s", 0.5, 7, "slow it down")
+    of = {name: dataclasses.replace(plan(), id=name) for name in "abcd"}
+    judged = [CheckedPlan(of[name], [bad] if name in "bd" else []) for name in "abcd"]
+    with pytest.raises(RefusedError, match=r"^stroke b: speed 9 .*; 2 of 4 strokes fail: b, d$"):
+        execution_plan.refuse_any(judged)
+    with pytest.raises(RefusedError) as alone:
+        execution_plan.refuse_any(judged[:3])
+    assert "strokes fail" not in str(alone.value)
+    execution_plan.refuse_any([judged[0], judged[2]])
+
+
 def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():
     plain, lifted = ExecuteSettings(), ExecuteSettings(clearance=5.0)
     assert not execution_plan.lifts(batch("a", folder=False), plain)
@@ -52,12 +68,51 @@ def test_one_stroke_of_a_file_is_not_lifted_but_for_a_clearance():
     assert execution_plan.lifts(batch("a"), plain)
 
 
+def prepared(strokes, position=START, **options):
+    clock = FakeClock()
+    servo = FakeServo(clock, position=position)
+    done = []
+    found = execution_plan.prepare(
+        StrokeSelection(tuple(FoundStroke(s, {}) for s in strokes), {}, (), len(strokes) > 1),
+        ExecuteSettings(**options),
+        ReadyArm(servo, servo.info, clock),
+        False,
+        done.append,
+    )
+    return found, done
+
+
+def test_a_single_stroke_is_drawn_from_where_the_arm_stands_and_ends_on_the_work():
+    [one], _ = prepared([stroke()])
+    assert one.failure is None
+    assert [phase for phase, _ in one.plan.legs] == ["stroke"]
+    [told], _ = prepared([stroke()], START + [0.0, 0.0, 30.0])
+    assert told.failure.quantity == "distance from the arm to the start"
+    # Asked to come, it comes through the air, from above.
+    [led], done = prepared([stroke()], START + [0.0, 40.0, 30.0], approach=20.0)
+    assert led.failure is None
+    assert led.plan.position[: led.plan.lead, 2].min() >= START[2] - 1e-9
+    assert led.plan.legs[-1][0] == "stroke"
+    assert done == [1]
+
+
+def test_each_of_several_strokes_is_planned_from_where_the_one_before_it_ended():
+    checked, done = prepared([stroke(), stroke(), stroke()], clearance=15.0)
+    assert done == [1, 1, 1]
+    assert [one.failure for one in checked] == [None] * 3
+    for before, after in itertools.pairwise(checked):
+        assert after.plan.position[0] == pytest.approx(before.plan.position[-1], abs=1e-9)
+    for one in checked:
+        assert one.plan.position[-1, 2] == pytest.approx(START[2] + 15.0)
+        assert one.plan.legs[-1][0] == "retract"
+
+
 def test_the_set_points_wait_for_the_look_ahead():
     between = execution_plan.ways(ExecuteSettings(), 0.15, presses=False)
     assert (between.settling, between.clearance, between.spare) == (8, 20.0, 0.0)
-    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 5.0
+    assert execution_plan.ways(ExecuteSettings(), 0.0, presses=True).spare == 15.0
     with pytest.raises(InputError, match="--clearance 5: must be over 5 mm"):
-        execution_plan.ways(ExecuteSettings(clearance=5.0), 0.0, presses=True)
+        execution_plan.ways(ExecuteSettings(clearance=5.0, coupling_clamp=5.0), 0.0, presses=True)
 
 
 def test_the_facts_hold_each_strokes_own_ends_once():

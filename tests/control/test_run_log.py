@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 
 from dmpcli.control.run_log import Row, RunLog
@@ -38,6 +40,16 @@ def test_what_was_not_asked_for_is_absent():
     assert "rx_plan" not in cols
     assert "rx_sent" in cols
     assert "coupling" not in cols
+
+
+def test_joints_are_kept_as_they_were_told_and_a_cycle_without_is_not_a_number():
+    told = [replace(row(i), joints=0.1 * i + np.arange(6.0)) for i in range(3)]
+    cols = columns([*told, row(3)], joints=6)
+    np.testing.assert_array_equal(cols["q3"][:3], [2.0, 2.1, 2.2])
+    assert np.isnan(cols["q6"][3])
+    assert "q7" not in cols
+    assert "q1" not in columns(told)
+    assert "q1" not in columns(told, joints=9)  # the schema has no room for so many
 
 
 def test_a_wrench_that_is_missing_in_one_row_is_not_a_number():

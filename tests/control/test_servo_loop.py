@@ -4,8 +4,9 @@ import signal
 import numpy as np
 import pytest
 
-from dmpcli.admittance import model as admittance
-from dmpcli.admittance.force_coupling import CouplingLaw, fast_filter
+from dmpcli.admittance.force_coupling import fast_filter
+from dmpcli.control.contact_policy import ContactPolicy
+from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
@@ -32,6 +33,20 @@ PERIOD = 0.02
 NOTHING = np.zeros(6)
 
 
+class PlateSensor(PolledSensor):
+    """Feels a plate of 2 N/mm through the stroke, as long as `plate`; else its `wrench`."""
+
+    def __init__(self, clock, servo):
+        super().__init__(clock)
+        self.servo, self.plate = servo, START[2]
+
+    def poll(self):
+        if self.plate is not None:
+            pushes = 2.0 * max(self.plate - self.servo.position[2], 0.0)
+            self.wrench = np.array([0.0, 0.0, pushes, 0.0, 0.0, 0.0])
+        return super().poll()
+
+
 class Bench:
     def __init__(self, made=None, jumps=None, at=None, limits=WIDE, presses=False, **servo):
         self.plan = plan() if made is None else made
@@ -39,16 +54,15 @@ class Bench:
         self.servo = FakeServo(self.clock, at=at, **servo)
         self.interruption = Interruption()
         arm = ReadyArm(self.servo, self.servo.info, self.clock)
-        self.sensor = PolledSensor(self.clock)
+        self.sensor = PlateSensor(self.clock, self.servo) if presses else PolledSensor(self.clock)
         self.loop = ServoLoop(self.plan, limits, WATCH, arm, self.touch() if presses else None)
 
     def touch(self):
-        """Feel in base axes, and seek the surface at 5 N / 2 N·s/mm = 2.5 mm/s."""
+        """Feel in base axes; look for the surface at 2 mm/s."""
         info = SensorInfo("fake", 100.0, np.full(6, 100.0))
         sensing = Sensing(self.sensor, info, 100.0, PERIOD, self.clock)
-        model = admittance.AdmittanceLaw(np.array([0.08]), np.array([2.0]), np.zeros(1), PERIOD)
-        law = CouplingLaw(model, 5.0, 5.0, 0.5, 0.1, 10.0)
-        pressing = ForceTracker(law, fast_filter(5.0, PERIOD), self.plan)
+        supervisor = ContactSupervisor(ContactPolicy(5.0, delay=0.02), PERIOD)
+        pressing = ForceTracker(supervisor, fast_filter(5.0, PERIOD), self.plan)
         return ForceInput(sensing, lambda sensed, _: sensed, pressing)
 
     def run(self):
@@ -359,43 +373,108 @@ def pressing(**options):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_it_seeks_contact_ends_the_seeking(number):
-    """Seeking goes on at 2.5 mm/s towards the surface; from the signal on nothing may move."""
-    bench = pressing(at={40: lambda servo: bench.interruption.receive(number)})
+    """Seeking goes on towards the surface; from the signal on nothing may move."""
+    bench = pressing(at={140: lambda servo: bench.interruption.receive(number)})
+    bench.sensor.plate = None
     outcome = bench.run()
     assert (outcome.signal, outcome.failure) == (number, None)
-    depth = START[2] - np.array([row.sent[0][2] for row in bench.rows])
-    assert depth[39] > 1.0
-    np.testing.assert_array_equal(depth[40:], depth[39])
-    assert len(depth) < 40 + 50
+    assert bench.rows[139].contact == "seeking"
+    height = np.array([row.sent[0][2] for row in bench.rows]) - START[2]
+    assert 0.0 < height[139] < height[100]
+    np.testing.assert_array_equal(height[140:], height[139])
+    assert len(height) < 140 + 50
+
+
+def drawing(cycles=100):
+    """Number of the cycle that many after the stroke has begun, in a run that nothing disturbs."""
+    calm = pressing()
+    assert calm.run().reason == DONE
+    return next(i for i, row in enumerate(calm.rows) if row.phase == "stroke") + cycles
+
+
+def test_a_coupled_run_holds_its_force_and_leaves_the_work_clear():
+    bench = pressing()
+    assert bench.run().reason == DONE
+    rows = bench.rows
+    seen = list(dict.fromkeys(row.contact for row in rows))
+    assert seen == ["free", "seeking", "landing", "drawing", "retreating"]
+    drawn = [row for row in rows if row.phase == "stroke" and row.contact == "drawing"]
+    np.testing.assert_allclose([row.wrench[2] for row in drawn], 5.0, atol=0.25)
+    assert {row.force for row in drawn} == {5.0}
+    assert bench.loop.drawn == ["0"]
+    assert bench.servo.position[2] > START[2] + 5.5
+
+
+def test_a_stroke_in_the_air_does_not_count_as_drawn():
+    """The part ends: its contact is waited for, and the stroke ends in the air."""
+    at = drawing()
+    bench = pressing(at={at: lambda servo: setattr(bench.sensor, "plate", -1000.0)})
+    policy = bench.loop.pressing.supervisor.policy
+    bench.loop.pressing.supervisor.policy = dataclasses.replace(policy, on_loss="hold")
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "under 95 % (--min-contact)" in outcome.reason
+    assert bench.loop.drawn == []
+
+
+def test_where_contact_is_lost_for_good_it_comes_to_rest_and_says_so():
+    at = drawing()
+    bench = pressing(at={at: lambda servo: setattr(bench.sensor, "plate", -1000.0)})
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "not found again within 6 mm" in outcome.reason
+    assert bench.rows[-1].phase == "stop"
+    assert bench.loop.stop_outcome.confirmed
+
+
+def test_a_wall_stops_it_in_the_cycle_that_feels_it():
+    at = drawing()
+    bench = pressing()
+
+    def wall(servo):
+        bench.sensor.plate = None
+        bench.sensor.wrench = np.array([9.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+
+    bench.servo.at = {at: wall}
+    outcome = bench.run()
+    assert "has met a wall or an edge" in outcome.reason
+    assert len(bench.servo.sent) == at
 
 
 def test_a_signal_on_the_stroke_freezes_the_displacement():
-    bench = pressing(at={200: lambda servo: bench.interruption.receive(signal.SIGINT)})
-    bench.sensor.wrench = np.array([0.0, 0.0, 5.1, 0.0, 0.0, 0.0])
+    at = drawing()
+    bench = pressing(at={at: lambda servo: bench.interruption.receive(signal.SIGINT)})
     assert bench.run().signal == signal.SIGINT
     off = np.array([row.sent[0][2] - row.planned[0][2] for row in bench.rows])
-    assert bench.rows[199].phase == "stroke"
-    np.testing.assert_allclose(off[200:], off[199], atol=1e-12)
+    assert bench.rows[at - 1].phase == "stroke"
+    np.testing.assert_allclose(off[at:], off[at - 1], atol=1e-12)
 
 
 def test_a_stale_sensor_does_not_drive_the_coupling():
     """Four cycles of silence are no contact lost: the displacement waits for the next sample."""
+    at = drawing()
     bench = pressing()
+
+    def silent(servo):
+        bench.sensor.silent = True
+        bench.sensor.plate -= 0.5
+
     bench.servo.at = {
-        100: lambda servo: setattr(bench.sensor, "silent", True),
-        104: lambda servo: setattr(bench.sensor, "silent", False),
+        at: silent,
+        at + 4: lambda servo: setattr(bench.sensor, "silent", False),
     }
-    bench.sensor.wrench = np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
     bench.run()
     rows = bench.rows
-    assert [row.wrench is None for row in rows[100:105]] == [False, False, True, True, False]
-    assert rows[102].coupling == rows[103].coupling == rows[101].coupling
-    assert rows[101].coupling < rows[100].coupling
+    felt = [row.wrench is None for row in rows[at : at + 5]]
+    assert felt == [False, False, True, True, False]
+    assert rows[at + 2].coupling == rows[at + 3].coupling == rows[at + 1].coupling
+    assert rows[at + 6].coupling < rows[at + 3].coupling
 
 
 def test_a_displacement_out_of_the_workspace_is_not_sent():
     box = (-900.0, 0.0, 0.0, 900.0, START[2] - 1.5, 100.0)
     bench = pressing(limits=dataclasses.replace(WIDE, workspace=box))
+    bench.sensor.plate = None
     outcome = bench.run()
     assert isinstance(outcome.failure, RefusedError)
     assert "workspace" in outcome.reason
@@ -407,7 +486,7 @@ def test_a_displacement_faster_than_the_limit_is_not_sent():
     limits = dataclasses.replace(WIDE, speed=2.0)
     outcome = pressing(limits=limits).run()
     assert isinstance(outcome.failure, RefusedError)
-    assert "next set-point would take 2." in outcome.reason
+    assert "next set-point would take" in outcome.reason
 
 
 def test_an_arm_outside_the_workspace_stops():
@@ -443,6 +522,7 @@ def test_a_pose_that_is_not_a_number_stops(attribute):
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_wrench_that_is_not_a_number_stops(value):
     bench = pressing()
+    bench.sensor.plate = None
     wrench = np.array([0.0, 0.0, value, 0.0, 0.0, 0.0])
     bench.servo.at = {30: lambda servo: setattr(bench.sensor, "wrench", wrench)}
     outcome = bench.run()
@@ -497,6 +577,7 @@ def test_braking_never_breaks_the_limit_that_the_plan_keeps(at):
 
 def test_a_torque_over_the_limit_stops():
     bench = pressing()
+    bench.sensor.plate = None
     wrench = np.array([0.0, 0.0, 2.0, 0.0, 5.1, 0.0])
     bench.servo.at = {30: lambda servo: setattr(bench.sensor, "wrench", wrench)}
     outcome = bench.run()

@@ -73,8 +73,9 @@ def test_a_signal_that_ends_the_program_as_handlers_are_put_back_leaves_none_beh
         if number == signal.SIGINT and handler is signal.default_int_handler:
             raise KeyboardInterrupt
 
+    monkeypatch.setattr(signal, "signal", raising)
     with pytest.raises(KeyboardInterrupt), Interruption():
-        monkeypatch.setattr(signal, "signal", raising)
+        pass
     monkeypatch.undo()
     assert handlers() == before
 

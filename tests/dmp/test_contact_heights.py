@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmpcli.dmp.contact_heights import ContactHeights, contact_heights, end_heights
+from dmpcli.dmp.contact_heights import ContactHeights, contact_heights, end_heights, pressed
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.spatial.trajectory import Trajectory
@@ -100,3 +100,11 @@ def test_the_blend_is_contact_within_the_band_and_the_height_from_twice_it(band,
     near = found.drawn(np.array([w, w + 1e-6]))
     # Without a jump: nowhere steeper than a few times the height itself.
     assert abs(near[1] - near[0]) <= 5e-6
+
+
+def test_the_tool_presses_in_contact_and_not_where_it_is_lifted():
+    found = contact_heights(taught(0.4 + bump(8.0)), None, offset=-0.5)
+    w = found.drawn(np.array([0.4, 0.9, 8.4]))
+    np.testing.assert_array_equal(pressed(w, 3.0, found), [3.0, 3.0, 0.0])
+    np.testing.assert_array_equal(pressed(np.array([0.4, -0.9, 8.4]), 3.0, None), [3.0, 3.0, 0.0])
+    assert pressed(w, None, found) is None

@@ -100,3 +100,21 @@ def test_what_a_path_does_within_a_hundredth_of_a_millimetre_of_its_rest_is_no_d
     up = np.broadcast_to(np.eye(3)[2], position.shape)
     ahead = travel(position, up)[0]
     assert np.degrees(np.arctan2(np.abs(ahead[:, 1]), ahead[:, 0])).max() < 1.0
+
+
+def test_a_path_of_one_sample_has_no_direction():
+    assert travel(np.ones((2, 1, 3)), np.ones((2, 1, 3))).tolist() == [[[0.0] * 3]] * 2
+
+
+def test_paths_beside_one_another_have_each_its_own_directions():
+    t = np.linspace(0.0, 1.0, 60)
+    a = np.stack([40 * np.sin(3 * t), 40 * (1 - np.cos(3 * t)), 0 * t], axis=-1)
+    paths = np.stack([a, a[::-1] * [1.0, 2.0, 1.0], np.tile(a[:1], (60, 1)), 3 * a + 500.0])
+    up = np.broadcast_to(np.eye(3)[2], paths.shape)
+    together = travel(paths, up)
+    for i, path in enumerate(paths):
+        np.testing.assert_allclose(together[i], travel(path[None], up[:1])[0], atol=1e-12)
+    # A circle's tangents, by its closed form.
+    angle = 3 * t[5:-5]
+    tangent = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+    np.testing.assert_allclose(together[0, 5:-5], tangent, atol=2e-3)

@@ -224,3 +224,84 @@ def test_the_first_orientation_is_smoothed_too_where_the_recording_begins_before
 def test_what_the_papers_learning_knows_nothing_of_is_refused(name, asked, paper):
     with pytest.raises(InputError, match=rf"^{name}: "):
         fit([paper_stroke()], FitOptions(**asked, **paper))
+
+
+def test_the_spread_of_several_demonstrations_is_their_standard_deviation_by_axis():
+    """Three strokes lifted by -2, 0 and 2 mm and swung by 40, 50 and 60: along one path in plan."""
+    t = np.linspace(0.0, 5.0, 401)
+    u = minimum_jerk(t / 5.0)
+    swing = np.sin(np.pi * u) ** 2
+    given = [
+        Trajectory(t, np.stack([200 * u, (50 + by) * swing, 0.2 * by * swing], axis=1))
+        for by in (-10.0, 0.0, 10.0)
+    ]
+    skill = fit(given, FitOptions(align="time", normal=(0.0, 0.0, 1.0))).skill
+    found = skill.spread
+    assert found.share[[0, -1]].tolist() == [0.0, 1.0]
+    at = np.sin(np.pi * minimum_jerk(found.share)) ** 2
+    deviation = np.sqrt(200.0 / 3.0)
+    np.testing.assert_allclose(found.deviation[:, 1], deviation * at, atol=0.15)
+    np.testing.assert_allclose(found.deviation[:, 2], 0.2 * deviation * at, atol=0.15)
+    np.testing.assert_allclose(found.deviation[:, [0, 3, 4, 5]], 0.0, atol=0.15)
+    assert fit(given[:1], FitOptions()).skill.spread is None
+
+
+@pytest.mark.parametrize("model", ["modified", "original"])
+def test_the_same_stroke_drawn_slower_teaches_the_same_to_the_paper(model):
+    """Two demonstrations of one shape, 5 s and 10 s: the skill of either, drawn in 7.5 s."""
+    options = FitOptions(model=model, learning="paper", regression="ridge")
+
+    def drawn(duration):
+        t = np.linspace(0.0, duration, 501)
+        u = minimum_jerk(t / duration)
+        position = np.stack([120 * u, 30 * np.sin(2 * np.pi * u) + 5 * u, 10 * u], axis=1)
+        return Trajectory(t, position, None)
+
+    both = fit([drawn(5.0), drawn(10.0)], options).skill
+    alone = fit([drawn(7.5)], options).skill
+    assert both.duration == pytest.approx(7.5)
+    size = np.abs(alone.weights).max()
+    np.testing.assert_allclose(both.weights, alone.weights, atol=0.01 * size)
+    np.testing.assert_allclose(both.start, alone.start, atol=1e-6)
+    np.testing.assert_allclose(both.goal, alone.goal, atol=1e-6)
+
+
+def test_what_smoothing_took_off_is_the_root_mean_square_of_the_distances():
+    stroke = paper_stroke(801)
+    rng = np.random.default_rng(3)
+    noisy = Trajectory(
+        stroke.t, stroke.position + 0.2 * rng.standard_normal((801, 3)), stroke.rotation
+    )
+    found = fit([noisy], FitOptions()).prepared[0]
+    off = np.linalg.norm(found.stroke.position - found.recorded, axis=1)
+    assert found.removed == pytest.approx(np.sqrt(np.mean(off**2)))
+    # Nearly all of the noise of three axes.
+    assert found.removed == pytest.approx(0.2 * np.sqrt(3.0), rel=0.06)
+
+
+def test_strokes_of_differing_length_teach_the_paper_the_stroke_of_their_mean_length():
+    """Lengths of 100 and 140 mm, one wave height: in u they are brought to 120 mm, v stays."""
+    options = FitOptions(learning="paper", regression="ridge")
+
+    def drawn(length):
+        t = np.linspace(0.0, 6.0, 501)
+        u = minimum_jerk(t / 6.0)
+        return Trajectory(t, np.stack([length * u, 30 * np.sin(2 * np.pi * u), 0 * u], axis=1))
+
+    both, alone = (fit([drawn(x) for x in of], options) for of in ([100.0, 140.0], [120.0]))
+    size = np.abs(alone.skill.weights).max()
+    np.testing.assert_allclose(both.skill.weights, alone.skill.weights, atol=1e-6 * size)
+    assert both.skill.goal[0] == pytest.approx(120.0, abs=1e-3)
+    # Each is shown in the length in which it was drawn.
+    for reproduction, length in zip(both.reproductions, (100.0, 140.0), strict=True):
+        assert np.ptp(reproduction.demonstrated[:, 0]) == pytest.approx(length, abs=0.01)
+        assert reproduction.reproduced[-1, 0] == pytest.approx(length, abs=0.1)
+        assert height(reproduction) == pytest.approx(60.0, abs=3.0)
+
+
+def test_the_largest_angle_between_what_was_shown_and_what_is_drawn_is_told():
+    for given in ([paper_stroke(turning=True)], [paper_stroke(turning=True)] * 2):
+        for told in fit(given, FitOptions()).reproductions:
+            assert 0.0 < told.angle < np.radians(1.0)
+    still = fit([Trajectory(paper_stroke().t, paper_stroke().position)], FitOptions())
+    assert not still.reproductions[0].angle

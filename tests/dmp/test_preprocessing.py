@@ -9,6 +9,7 @@ from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
 from dmpcli.spatial.trajectory import Trajectory
 from tests.dmp.recordings import jerk, noisy, six_seconds, times, wave, with_approach
+from tests.dmp.strokes import paper_stroke
 
 
 def nearest(points, truth):
@@ -133,3 +134,8 @@ def test_a_long_recording_is_smoothed_as_a_short_one():
     result = preprocess(Trajectory(t, noisy(truth, 0.1)), trim=False)
     assert np.linalg.norm(result.position(t) - truth, axis=1).max() <= 0.1
     assert result.sigma == pytest.approx(0.1, rel=0.02)
+
+
+def test_shares_of_the_band_are_of_half_the_sampling_rate():
+    stroke = paper_stroke(801)
+    assert preprocess(stroke).half_rate == pytest.approx(40.0)

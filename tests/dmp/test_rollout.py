@@ -280,3 +280,33 @@ def test_shared_curves_begin_at_start_and_sum_to_one(skill):
     shared = curves(skill, np.linspace(0, skill.duration, 20))
     np.testing.assert_allclose(shared[0] + shared[1], 1.0, atol=1e-15)
     np.testing.assert_allclose(shared[2:, 0], 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("about", ["own plane", "plane", "tilted"])
+def test_a_closed_stroke_is_enlarged_and_turned_about_its_start(ring, about):
+    n = np.array([0.0, 0.0, 1.0]) if about == "plane" else ring.frame.normal
+    start = np.array([10.0, 20.0, 30.0])
+    plate = None if about == "own plane" else Plane(start, n)
+    plain = draw_one(ring, start, start, plate).position - start
+    other = draw_one(ring, start, start, plate, size=1.7, turn=0.6).position - start
+    turned = Rotation.from_rotvec(0.6 * n)
+    across = plain - np.outer(plain @ n, n)
+    expected = 1.7 * turned.apply(across) + np.outer(plain @ n, n)
+    np.testing.assert_allclose(other, expected, atol=0.02)
+    # The demonstrated pair's own size and place give the demonstration back.
+    own = draw_one(ring, ring.frame.start, ring.frame.start).position
+    assert np.ptp(own, axis=0) == pytest.approx(np.ptp(circle().position, axis=0), abs=0.1)
+
+
+def test_a_slow_spring_still_ends_where_it_was_asked_to():
+    """At tau = 2 the spring alone would leave some per cent of the start-goal line."""
+    stroke = paper_stroke(turning=True)
+    for tau in (0.5, 2.0):
+        skill = fit([stroke], FitOptions(tau=tau)).skill
+        last = Rotation.from_euler("XYZ", [-3.1, -0.1, 0.9]).as_matrix()
+        pairs = Pairs(NEW_START[None], NEW_GOAL[None], None, last[None])
+        for orientation in ("keep", "surface"):
+            drawn = draw_one(skill, None, None, pairs=pairs, orientation=orientation)
+            assert np.linalg.norm(drawn.position[-1] - NEW_GOAL) < 1e-6
+            R = rotations.from_euler(drawn.euler[-1])
+            assert np.linalg.norm(rotations.log(R @ last.T)) < 1e-6

@@ -1,11 +1,14 @@
 """Demonstrations in their charts: planes, exact surfaces, and what does not lie on them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.preprocessing import preprocess
+from dmpcli.dmp.skill import TaskFrame
 from dmpcli.dmp.taught_strokes import mean_frame, taught_strokes
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.spatial.trajectory import Trajectory
@@ -116,3 +119,38 @@ def test_the_mean_frame_lies_between():
     np.testing.assert_allclose(frame.goal - frame.start, half @ [300.0, 0.0, 0.0], atol=1e-6)
     other = mean_frame(found[::-1], closed)
     np.testing.assert_allclose(other.axes, frame.axes, atol=1e-12)
+
+
+@pytest.mark.parametrize("width", [0.1, 0.8, 1.6])
+def test_the_mean_of_charts_is_scipys_mean_of_their_rotations(width):
+    rng = np.random.default_rng(int(10 * width))
+    compared = 0
+    for _ in range(40):
+        axes = Rotation.from_rotvec(width * rng.standard_normal((3, 3)))
+        tools = axes * Rotation.from_rotvec(0.3 * rng.standard_normal((3, 3)))
+        starts = rng.standard_normal((3, 3))
+        frames = [
+            TaskFrame(start, start + 50.0 * chart[:, 0], chart, tool)
+            for start, chart, tool in zip(starts, axes.as_matrix(), tools.as_matrix(), strict=True)
+        ]
+        mean = mean_frame([SimpleNamespace(frame=frame) for frame in frames], False)
+        if np.linalg.svd(axes.as_matrix().mean(axis=0), compute_uv=False)[1] < 0.1:
+            continue
+        compared += 1
+        expected = axes.mean().as_matrix()
+        np.testing.assert_allclose(mean.axes, expected, atol=1e-9)
+        np.testing.assert_allclose(mean.start, starts.mean(axis=0))
+        np.testing.assert_allclose(mean.goal, mean.start + 50.0 * expected[:, 0])
+        turn = (axes.inv() * tools).mean().as_matrix()
+        np.testing.assert_allclose(mean.rotation, expected @ turn, atol=1e-9)
+    assert compared > 20
+
+
+def test_the_goal_of_closed_strokes_is_the_mean_of_their_gaps():
+    frames = [
+        TaskFrame(np.array([1.0, 0, 0]), np.array([1.0, 0.5, 0]), np.eye(3), None),
+        TaskFrame(np.array([3.0, 0, 0]), np.array([3.0, 1.5, 2.0]), np.eye(3), None),
+    ]
+    mean = mean_frame([SimpleNamespace(frame=frame) for frame in frames], True)
+    assert mean.goal.tolist() == [2.0, 1.0, 1.0]
+    assert mean.rotation is None

@@ -13,6 +13,7 @@ import numpy as np
 from dmpcli.control import guards, stopping
 from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import LoopOutcome
+from dmpcli.control.outputs import OutputSwitch
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import UnconfirmedStopError
 from dmpcli.instruments.elite.arm_driver import ArmDriver
@@ -75,6 +76,11 @@ PLANTED: dict[str, tuple[Plant, str, tuple[str, ...]]] = {
         lambda: mock.patch.object(guards, "check_ready", _nothing),
         "execute",
         ("frame_flag",),
+    ),
+    "what is on stays on": (
+        lambda: mock.patch.object(OutputSwitch, "leave", _nothing),
+        "execute",
+        ("estop",),
     ),
     "the arm is not told to stop": (
         lambda: mock.patch.object(ArmDriver, "stop", _dropped_stop),

@@ -24,6 +24,8 @@ from dmpcli.records import file_io, record, schemas, tool
 from dmpcli.records.record import Provenance, Record
 from dmpcli.simulation.elite_server.lab import ROBOT_MODEL, LabParameters
 from dmpcli.simulation.mock import PEN, Plate
+from dmpcli.spatial import output_events
+from dmpcli.spatial.output_events import OutputEvent
 from tests.faults.bench import Bench
 from tests.faults.faults import KINDS, Wrong
 from tests.faults.world import EndlessError
@@ -49,6 +51,8 @@ _REST, _AFTER = 0.5, 0.3
 _ENDING = 0.15
 # What a person is told where the arm was not seen at rest.
 _UNSURE = "THE ARM MAY STILL MOVE"
+OUTPUT, _LEFT_ON = "DO1", "MAY STILL BE ON: DO1"
+"""What is switched on along every stroke, and what is told where it could not be switched off."""
 
 
 @dataclass
@@ -110,6 +114,9 @@ def folder() -> Path:
         path = np.column_stack([-20.0 * u, 12.0 * u + 4.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
         x, y, z = (START + scale * path).T
         columns = {"id": np.full(len(t), "0", dtype=object), "t": t, "x": x, "y": y, "z": z}
+        # On for the rest of the stroke, and off whatever ends it.
+        events = output_events.stored([OutputEvent(0.13 * t[-1], OUTPUT, on=True)], t)
+        columns |= {schemas.EVENT: np.array(events, dtype=object)}
         facts = {"tau": float(t[-1]), "normal": [0.0, 0.0, 1.0]}
         drawn = Record(schemas.TRAJECTORY, columns, Provenance("generalize", {}, (), facts))
         (made / f"{name}.parquet").write_bytes(record.encode(drawn))
@@ -180,7 +187,7 @@ def _words(command: str, stroke: str, output: Path) -> list[str]:
         return ["calibrate", *words, *felt, *few, "--save", str(output.with_suffix(".parquet"))]
     words = ["execute", str(made / f"{stroke}.parquet"), *words]
     if command.endswith("file"):
-        words.append("--allow-file-mode")
+        words += ["--allow-file-mode", "--ignore-events"]
     if command.endswith("felt"):
         words += felt
     if command.endswith("pressed"):
@@ -246,6 +253,9 @@ def _judged(
         yield "the arm moves on, and could have been told to stop"
     if not rest and code in (0, 2, 3):
         yield f"the arm moves on, and the exit code is {code}"
+    on = any(bench.lab.controller.outputs.values())
+    if on and (_LEFT_ON not in told or code == 0):
+        yield f"an output was left on, and exit {code} does not tell it"
     yield from _steps(finding, bench)
     if code == 0:
         yield from _done(finding, bench, output, wrong)
@@ -345,6 +355,8 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
     away = float(np.linalg.norm(at - _plan(finding.stroke)[-1]))
     if finding.command != "execute pressed" and away > 1.0:
         yield f"exit 0, and the arm stands {away:.2f} mm from the goal"
+    if finding.command != "execute file" and not bench.lab.controller.outputs:
+        yield "exit 0, and an output of the stroke was never switched on"
 
 
 def _kept(finding: Finding, bench: Bench, output: Path) -> Iterator[str]:

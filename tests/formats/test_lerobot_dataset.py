@@ -126,3 +126,20 @@ def test_another_state_is_refused_with_the_option_that_says_it(tmp_path):
     path.write_text(path.read_text().replace('"x_m"', '"shoulder"'))
     with pytest.raises(InputError, match="--layout lerobot --map x="):
         lerobot_dataset.read(tmp_path / "ds", None)
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "words"),
+    [
+        ('"total_episodes": 1', '"total_episodes": 1e999', "damaged"),
+        ('"qw"', '"qw", "grip"', r"holds 7 numbers a sample, 8 are described"),
+    ],
+)
+def test_a_description_that_does_not_fit_its_data_is_refused(tmp_path, was, becomes, words):
+    written(tmp_path / "ds", wave())
+    path = tmp_path / "ds" / "meta" / "info.json"
+    text = path.read_text()
+    assert was in text
+    path.write_text(text.replace(was, becomes))
+    with pytest.raises(InputError, match=words):
+        lerobot_dataset.read(tmp_path / "ds", None)

@@ -1,12 +1,17 @@
 """What other programs say of our files."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dmpcli.formats import polylines, rapid, tum
+from dmpcli.formats import gcode, polylines, rapid, tum
 from dmpcli.formats.toolpath import ProgramOptions
+from dmpcli.records.file_io import Source
+from dmpcli.spatial.output_events import OutputEvent
 from tests.formats.motions import motion, wave
-from tests.outside_judge import judge
+from tests.outside_judge import interpreted, judge, linuxcnc
 
 OLD_NAMES = pytest.mark.filterwarnings("ignore:.* deprecated:DeprecationWarning")
 """rapidchecker calls pyparsing by names that it warns of."""
@@ -20,6 +25,17 @@ def test_rapidchecker_parses_our_rapid(options):
     text = rapid.encode(
         motion(wave(samples=5), wave(samples=4, name="b")), options, "wave"
     ).decode()
+    assert not check_format(text)
+
+
+@OLD_NAMES
+def test_rapidchecker_parses_the_outputs_that_our_rapid_switches():
+    from rapidchecker.check import check_format
+
+    events = tuple(OutputEvent(t, "DO1", on=t < 2.0) for t in (0.0, 1.2345, 3.0, 4.0))
+    one = replace(wave(samples=9), events=events)
+    text = rapid.encode(motion(one), ProgramOptions(), "wave").decode()
+    assert "MoveLDO" in text
     assert not check_format(text)
 
 
@@ -57,3 +73,20 @@ def test_meshlab_reads_our_polylines(tmp_path, suffix):
     meshes.load_new_mesh(str(path))
     mesh = meshes.current_mesh()
     assert (mesh.vertex_number(), mesh.edge_number()) == (201, 200)
+
+
+@pytest.mark.skipif(linuxcnc() is None, reason="LinuxCNC's rs274 is not here (tools/linuxcnc.sh)")
+def test_linuxcnc_runs_our_gcode_along_the_same_points(tmp_path):
+    strokes = [wave(turning=False), wave(turning=False, offset=200.0, name="b")]
+    options = ProgramOptions(tilt=np.radians(30.0))
+    done = interpreted(gcode.encode(motion(*strokes), options), tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "PROGRAM_END()" in done.stdout
+    fed = re.findall(r"STRAIGHT_FEED\(([^)]*)\)", done.stdout)
+    points = np.array([[float(v) for v in found.split(",")[:3]] for found in fed])
+    back = gcode.decode(Source("wave.ngc", gcode.encode(motion(*strokes), options)), 0.05, 50.0)
+    ours = np.concatenate([one.position for one in back])
+    assert len(points) == len(ours)
+    np.testing.assert_allclose(points, ours, atol=1e-4)
+    bad = interpreted(b"G21 G1 X1 F10\nG1 Q5\nM2\n", tmp_path)
+    assert bad.returncode != 0

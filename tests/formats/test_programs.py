@@ -1,6 +1,7 @@
 """Robot programs: what they say by an independent reading, and that ours reads them back."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from dmpcli.formats import gcode, krl, rapid, urscript
 from dmpcli.formats.motion import MotionStroke
 from dmpcli.formats.toolpath import ProgramOptions, thinned
 from dmpcli.records.file_io import Source
+from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.wrench import Tool
 from tests.formats.motions import along, angle_between, motion, wave
 
@@ -71,6 +73,71 @@ def test_a_pause_and_a_turn_in_place_keep_their_seconds(language):
     (back,) = read(language, program(language, ProgramOptions(tolerance=0.0), one))
     np.testing.assert_allclose(back.t, t, atol=1e-5)
     assert np.degrees(angle_between(back.rotation, R).max()) < 1e-4
+
+
+SWITCHED = (
+    OutputEvent(0.0, "DO1", on=True),
+    OutputEvent(1.2345, "DO2", on=True),
+    OutputEvent(2.5, "DO1", on=False),
+    OutputEvent(2.5, "DO2", on=False),
+    OutputEvent(3.9, "DO1", on=True),
+    OutputEvent(4.0, "DO1", on=False),
+)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("lines", [1000, 12])
+def test_outputs_come_back_at_their_places(language, lines):
+    one = replace(wave(), events=SWITCHED)
+    (back,) = read(language, program(language, ProgramOptions(lines=lines), one))
+    assert [event.deed for event in back.events] == [event.deed for event in SWITCHED]
+    there, _ = along([event.t for event in SWITCHED], one)
+    found, _ = along([event.t for event in back.events], back)
+    np.testing.assert_allclose(found, there, atol=0.01)
+    times = [event.t for event in back.events]
+    np.testing.assert_allclose(times, [event.t for event in SWITCHED], atol=2e-3)
+
+
+WORDS = {
+    "urscript": (
+        r"# stroke 1\n\s+set_standard_digital_out\(1, True\)",
+        r"movel\(.*r=[\d.]+\)\n\s+set_standard_digital_out\(2, True\)",
+        r"set_standard_digital_out\(1, False\)\n\s+# end of stroke",
+    ),
+    "krl": (
+        r";stroke 1\n\$OUT\[1\]=TRUE",
+        r"TRIGGER WHEN DISTANCE=1 DELAY=0 DO \$OUT\[2\]=TRUE\nLIN .*C_DIS",
+        r"LIN [^\n]*\}\n\$OUT\[1\]=FALSE\n;end of stroke",
+    ),
+    "rapid": (
+        r"! stroke 1\n\s+SetDO DO1, 1;",
+        r"MoveLDO .*, \[[\d.]+,500,5000,1000\], \[FALSE,.*\\WObj:=wobj0, DO2, 1;",
+        r"fine, tStroke\\WObj:=wobj0;\n\s+SetDO DO1, 0;\n\s+! end of stroke",
+    ),
+}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_outputs_are_in_the_words_of_each_language(language):
+    text = program(language, None, replace(wave(), events=SWITCHED))
+    for pattern in WORDS[language]:
+        assert re.search(pattern, text), pattern
+
+
+@pytest.mark.parametrize(("language", "words"), [("urscript", "URScript"), ("krl", "KRL")])
+def test_an_output_that_a_language_cannot_name_is_refused(language, words):
+    one = replace(wave(), events=(OutputEvent(0.0, "glue", on=True),))
+    with pytest.raises(InputError, match=f"output glue: {words} numbers its outputs"):
+        program(language, None, one)
+
+
+def test_other_spellings_of_outputs_are_read():
+    text = program("rapid", None, replace(wave(), events=SWITCHED[:1]))
+    (back,) = read("rapid", text.replace("SetDO DO1, 1;", "Set glue;"))
+    assert [event.deed for event in back.events] == ["on glue"]
+    text = program("urscript", None, replace(wave(), events=SWITCHED[:1]))
+    (back,) = read("urscript", text.replace("set_standard_", "set_tool_"))
+    assert [event.output for event in back.events] == ["TO1"]
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -184,6 +251,24 @@ def test_a_program_that_does_more_is_refused_with_its_line(language, line, words
     text = program(language)
     with pytest.raises(InputError, match=rf"line \d+: .*{re.escape(words)}"):
         read(language, text.replace("\n", f"\n{line}\n", 1))
+
+
+HUGE = {
+    "urscript": "movel(p[{0}, 0, 0, 0, 0, 0], a=1, v={1})",
+    "krl": "$VEL.CP={1}\nLIN {{X {0},Y 0,Z 0,A 0,B 0,C 0}}",
+    "rapid": "MoveL [[{0},0,0],[1,0,0,0],[0,0,0,0],[0,0,0,0,0,0]], v1000\\V:={1}, fine, tool0;",
+}
+
+
+@pytest.mark.parametrize(("place", "speed"), [("1e300", "1"), ("5", "1e-320"), ("5", "1e300")])
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_numbers_that_are_no_quantities_are_refused_before_anything_overflows(
+    language, place, speed
+):
+    lines = [HUGE[language].format(0, 1), HUGE[language].format(place, speed)]
+    text = "\n".join(lines)
+    with pytest.raises(InputError, match=rf"line {text.count(chr(10)) + 1}: .* 1e\+30"):
+        read(language, text)
 
 
 @given(st.integers(3, 60), st.floats(0.001, 1.0), st.integers(0, 2**32 - 1))

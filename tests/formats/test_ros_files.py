@@ -209,3 +209,19 @@ def test_a_cut_file_is_exit_code_2(cut):
     content = mcap_file.encode(motion())[:cut]
     with pytest.raises(InputError, match=r"a\.mcap"):
         read(content)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
+def test_a_pose_that_is_no_quantity_is_refused_before_anything_overflows(value):
+    one = wave()
+    one.position[7, 1] = value
+    with pytest.raises(InputError, match=r"'/pose', message 8: .* beyond 1e\+30"):
+        read(mcap_file.encode(motion(one)))
+
+
+def test_metadata_nested_without_end_are_refused_before_they_are_parsed(tmp_path):
+    ros_bag.write(motion(), tmp_path / "bag")
+    path = tmp_path / "bag" / "metadata.yaml"
+    path.write_text(path.read_text().replace("custom_data:", f"custom_data: {'[' * 50_000}"))
+    with pytest.raises(InputError, match="nested too deep"):
+        ros_bag.read(tmp_path / "bag")

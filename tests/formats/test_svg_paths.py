@@ -103,3 +103,18 @@ def test_what_is_hidden_or_only_defined_is_not_drawn():
 def test_what_holds_no_path_is_refused(body, words):
     with pytest.raises(InputError, match=words):
         drawn(body)
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["M 0 0 C 1e300 1e300 5 5 9 9", "M 0 0 L 1e308 1e308 L -1e308 0", "M 0 0 A 1e200 2 0 1 1 9 9"],
+)
+def test_a_path_of_numbers_without_bounds_is_refused_without_a_warning(path):
+    with pytest.raises(InputError, match="beyond 100 m"):
+        drawn(f'<path d="{path}"/>')
+
+
+def test_a_number_without_end_is_refused_before_the_library_looks_for_one_in_it():
+    with pytest.raises(InputError, match="line 1: a number of more than 64 digits"):
+        drawn(f'<polyline points="{"9" * 5000}"/>')
+    drawn(f'<polyline points="0.{"3" * 60},0 5,5"/>')

@@ -102,7 +102,7 @@ class FakeControl:
 
 @pytest.fixture
 def fakes(monkeypatch):
-    made = types.SimpleNamespace(receive=[], control=[])
+    made = types.SimpleNamespace(receive=[], control=[], io=[])
 
     def keep(kind, into):
         def make(*args, **kwargs):
@@ -113,6 +113,8 @@ def fakes(monkeypatch):
 
     receive = types.SimpleNamespace(RTDEReceiveInterface=keep(FakeReceive, made.receive))
     control = types.SimpleNamespace(RTDEControlInterface=keep(FakeControl, made.control))
+    outside = types.SimpleNamespace(RTDEIOInterface=keep(FakeControl, made.io))
+    monkeypatch.setitem(sys.modules, "rtde_io", outside)
     monkeypatch.setitem(sys.modules, "rtde_receive", receive)
     monkeypatch.setitem(sys.modules, "rtde_control", control)
     monkeypatch.setattr(ur.UrDriver, "_probe", lambda self: None)
@@ -572,3 +574,49 @@ def test_a_robot_without_a_dashboard_cannot_be_driven_and_says_so(server):
             made.start(0.02)
     finally:
         made.close()
+
+
+# Outputs.
+
+
+def test_outputs_are_switched_by_rtde_on_a_connection_of_their_own(fakes):
+    made = driver()
+    made.connect()
+    for name in ("DO3", "CO0", "TO1"):
+        made.output(name)
+    assert fakes.io == []  # a dry run only reads
+    made.start(0.02)
+    for name, on in (("DO3", True), ("CO0", True), ("TO1", False)):
+        made.switch(name, on)
+    assert fakes.io[0].told == [
+        ("setStandardDigitalOut", 3, True),
+        ("setConfigurableDigitalOut", 0, True),
+        ("setToolDigitalOut", 1, False),
+    ]
+    made.close()
+    assert fakes.io[0].names()[-1] == "disconnect"
+
+
+def test_the_calls_are_those_that_ur_rtde_has():
+    outside = pytest.importorskip("rtde_io")
+    assert all(hasattr(outside.RTDEIOInterface, call) for call, _ in ur._OUTPUTS.values())
+
+
+@pytest.mark.parametrize("name", ["DO8", "TO2", "glue", "DO"])
+def test_an_output_that_it_has_not_is_refused(name):
+    with pytest.raises(InputError, match=f"has no output {name}; there are"):
+        driver().output(name)
+
+
+def test_an_output_that_the_robot_does_not_switch_is_a_failure(fakes):
+    made = driver()
+    made.connect()
+    made.output("DO1")
+    made.start(0.02)
+    fakes.io[0].fails.add("setStandardDigitalOut")
+    with pytest.raises(InstrumentError, match="DO1 failed: setStandardDigitalOut: broken pipe"):
+        made.switch("DO1", True)
+
+
+def test_without_outputs_there_is_no_such_connection(started, fakes):
+    assert fakes.io == []

@@ -75,3 +75,54 @@ def test_many_strokes_together_are_as_far_as_each_from_every_segment(seed, corne
         far = brute(stroke, taught * [factor, 1.0, 1.0])
         assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
         assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_at_the_same_share_of_the_time_the_gap_is_what_was_added(count):
+    rng = np.random.default_rng(count)
+    t = np.sort(np.concatenate([[3.0, 9.0], rng.uniform(3.0, 9.0, 80)]))
+    place = np.column_stack([10 * t, (t - 4) ** 2, np.sin(t)])
+    stretch = np.linspace(0.5, 2.0, count)
+    gap = rng.uniform(-5.0, 5.0, (3, count, 1)) * [[[1.0]], [[2.0]], [[0.5]]]
+    # Half as fast, begun at another time: each stroke is the demonstration and its own gap.
+    strokes = np.stack(
+        [np.outer(stretch, place[:, 0]), *(np.tile(c, (count, 1)) for c in place.T[1:])]
+    )
+    found = Taught(t, place).deviations(50.0 + 2.0 * t, strokes + gap, stretch)
+    size = np.linalg.norm(gap[..., 0], axis=0)
+    assert found.phase_rms == pytest.approx(size)
+    assert found.phase_max == pytest.approx(size)
+
+
+def curve(kind, m=300):
+    """A demonstration that comes near itself again, with a stretch where it stands still."""
+    s = np.linspace(0.0, 1.0, m)
+    still = np.interp(s, [0.0, 0.3, 0.4, 1.0], [0.0, 0.4, 0.4, 1.0])
+    a = 2 * np.pi * still
+    match kind:
+        case "eight":
+            return np.column_stack([40 * np.sin(a), 25 * np.sin(2 * a), 2 * np.cos(a)])
+        case "spiral":
+            return np.column_stack([6 * a * np.cos(3 * a), 6 * a * np.sin(3 * a), a])
+        case _:  # there and back along one line, nearly
+            return np.column_stack([60 * np.sin(a / 2), 1e-3 * a, 0 * a])
+
+
+@pytest.mark.parametrize("kind", ["eight", "spiral", "and back"])
+@pytest.mark.parametrize("late", [0.0, 0.15])
+def test_the_nearest_place_is_found_however_far_along_the_demonstration_it_is(kind, late):
+    rng = np.random.default_rng(1)
+    taught = curve(kind)
+    m, n = len(taught), 60
+    s = np.linspace(0.0, 1.0, n)
+    strokes, stretch = [], np.array([0.4, 1.0, 1.0, 1.7, 3.0])
+    for factor, off in zip(stretch, (0.0, 1e-5, 0.3, 3.0, 30.0), strict=True):
+        phase = np.clip(s + late * np.sin(2 * np.pi * s), 0.0, 1.0) * (m - 1)
+        base = np.column_stack([np.interp(phase, np.arange(m), c) for c in taught.T])
+        strokes.append(base * [factor, 1.0, 1.0] + off * rng.standard_normal((n, 3)))
+    together = np.stack(strokes).transpose(2, 0, 1)
+    found = Taught(np.linspace(0.0, 4.0, m), taught).deviations(s, together, stretch)
+    for i, (stroke, factor) in enumerate(zip(strokes, stretch, strict=True)):
+        far = brute(stroke, taught * [factor, 1.0, 1.0])
+        assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
+        assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)

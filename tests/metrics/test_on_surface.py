@@ -75,6 +75,23 @@ def test_distance_leaves_out_the_intended_height():
     assert on_surface.height_there(uv[::3], taught) == pytest.approx(w[::3])
 
 
+def test_the_demonstrations_height_is_read_on_the_segment_beside():
+    taught = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 5.0], [10.0, 8.0, 7.0], [30.0, 8.0, 7.0]])
+    uv = np.array([[2.0, 1.0], [6.5, -0.5], [10.5, 2.0], [9.0, 6.0], [-4.0, 0.0], [40.0, 9.0]])
+    expected = [1.0, 3.25, 5.5, 6.5, 0.0, 7.0]
+    assert on_surface.height_there(uv, taught) == pytest.approx(expected)
+
+
+def test_each_sample_touches_for_half_the_way_to_either_neighbour():
+    x = np.array([0.0, 1.0, 3.0, 7.0])
+    path = np.column_stack([0 * x, x, 0 * x])
+    height = np.array([0.5, 2.0, -0.5, -3.0])
+    # An end has one neighbour, which counts for both.
+    touching, lift = on_surface.contact(path, height, 0.5)
+    assert touching == pytest.approx((2.0 + 6.0) / (2.0 + 3.0 + 6.0 + 8.0))
+    assert lift == 2.0
+
+
 def test_tilt_is_the_angle_by_which_the_tool_was_turned():
     point, e_u, e_v = on_sphere(stroke())
     normal = np.cross(e_u, e_v)

@@ -94,3 +94,67 @@ def test_standing_still_has_no_smoothness():
     t = np.linspace(0, 1, 100)
     assert np.isnan(log_dimensionless_jerk(t, np.zeros((100, 3))))
     assert np.isnan(spectral_arc_length(t, np.zeros((100, 3))))
+
+
+def slow_and_rough(n=120, dt=0.05):
+    """Strokes of 20 Hz, too few to filter: smooth, rough, lopsided, and one at rest."""
+    rng = np.random.default_rng(8)
+    s = np.linspace(0.0, 1.0, n)
+    smooth = np.stack([80 * minimum_jerk(s), 9 * np.sin(np.pi * s), 0 * s])
+    rough = np.cumsum(rng.standard_normal((3, n)), axis=1)
+    lopsided = np.stack([50 * s**4, 20 * s**3, s])
+    return dt * np.arange(n), np.stack([smooth, rough, lopsided, np.ones((3, n))], axis=1)
+
+
+def sparc_as_published(speed, rate, cutoff=10.0, padding=4, threshold=0.05):
+    """Balasubramanian, Melendez-Calderon, Burdet 2012, with 2015's cut by amplitude."""
+    size = int(2 ** (np.ceil(np.log2(len(speed))) + padding))
+    f, share = np.arange(size) * rate / size, np.abs(np.fft.fft(speed, size))
+    share, f = share[f <= cutoff] / share.max(), f[f <= cutoff]
+    last = np.flatnonzero(share >= threshold)[-1]
+    f, share = f[: last + 1] / f[last], share[: last + 1]
+    return -np.sum(np.hypot(np.diff(f), np.diff(share)))
+
+
+def test_sparc_of_many_strokes_is_the_published_one_of_each():
+    t, strokes = slow_and_rough()
+    found = motion.spectral_arc_length(t, strokes)
+    assert np.isnan(found[3])
+    for i in range(3):
+        speed = np.linalg.norm(np.diff(strokes[:, i]), axis=0) / 0.05
+        assert found[i] == pytest.approx(sparc_as_published(speed, 20.0), rel=1e-9)
+        alone = motion.spectral_arc_length(t, strokes[:, i : i + 1])
+        assert found[i] == pytest.approx(alone[0], rel=1e-9)
+
+
+def test_jerk_of_many_strokes_is_that_of_each_by_finite_differences():
+    t, strokes = slow_and_rough()
+    found = motion.log_dimensionless_jerk(7.0 + t, strokes)
+    assert np.isnan(found[3])
+    for i in range(3):
+        jerk = np.diff(strokes[:, i], 3).T / 0.05**3
+        squared = np.sum(jerk**2, axis=1)
+        # From one end to the other: the first and the last value hold for a sample more.
+        integral = 0.05 * np.sum(squared[np.clip(np.arange(-1, len(jerk) + 1), 0, len(jerk) - 1)])
+        peak = np.max(np.linalg.norm(np.diff(strokes[:, i]).T, axis=1)) / 0.05
+        assert found[i] == pytest.approx(-np.log(t[-1] ** 3 * integral / peak**2), rel=1e-9)
+
+
+def test_a_movement_is_as_smooth_backwards():
+    t, strokes = slow_and_rough()
+    for measure in (motion.log_dimensionless_jerk, motion.spectral_arc_length):
+        back = measure(t, strokes[..., ::-1])
+        assert back == pytest.approx(measure(t, strokes), rel=1e-9, nan_ok=True)
+
+
+def test_uneven_samples_of_a_polyline_are_read_on_it():
+    """Corners are samples at the even times, so that what lies between changes nothing."""
+    t, strokes = slow_and_rough()
+    rng = np.random.default_rng(2)
+    even = np.linspace(0.0, t[-1], 2 * len(t) - 1)
+    finer = np.sort(np.concatenate([t, t[:-1] + rng.uniform(0.005, 0.045, len(t) - 1)]))
+    read = np.stack([[np.interp(finer, t, row) for row in part] for part in strokes])
+    at_even = np.stack([[np.interp(even, t, row) for row in part] for part in strokes])
+    found = motion.log_dimensionless_jerk(finer, read, cutoff=None)
+    expected = motion.log_dimensionless_jerk(even, at_even, cutoff=None)
+    assert found == pytest.approx(expected, rel=1e-6, nan_ok=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dmpcli.metrics.timing import punctuality
+from dmpcli.metrics.timing import punctuality, spread
 
 
 def test_quantiles():
@@ -24,3 +24,8 @@ def test_gaps_between_deadlines_are_missed_ones():
 
 def test_one_cycle_misses_nothing():
     assert punctuality(np.array([0.0]), np.array([0.0]), np.inf).missed == 0
+
+
+def test_a_spread_is_median_99th_percentile_and_maximum():
+    found = spread(np.arange(1001.0)[::-1])
+    assert found == {"p50": 500.0, "p99": 990.0, "max": 1000.0}

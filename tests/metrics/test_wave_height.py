@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import find_peaks
 
-from dmpcli.metrics.wave_height import lateral, stroke_wave, wave_heights
+from dmpcli.metrics.wave_height import ManyWaves, lateral, many_waves, stroke_wave, wave_heights
 from tests.minimum_jerk import minimum_jerk
 
 START = np.array([-551.030, 131.399, -17.560])
@@ -120,8 +120,86 @@ def test_heights_scale_with_the_signal_and_ignore_its_offset(values, factor, off
         )
 
 
+def turning_points(v):
+    """Samples of peaks and troughs of one signal by scipy, and the parabolas' tops by polyfit."""
+    least = 0.1 * np.ptp(v)
+    at = np.sort(
+        np.concatenate([find_peaks(sign * v, prominence=least)[0] for sign in (1.0, -1.0)])
+    )
+    tops = [np.polynomial.Polynomial.fit([-1, 0, 1], v[i - 1 : i + 2], 2).convert() for i in at]
+    offset = np.array([top.deriv().roots()[0] for top in tops])
+    return at + offset, np.array([top(x) for top, x in zip(tops, offset, strict=True)])
+
+
+@pytest.mark.parametrize(("n", "noise"), [(60, 0.0), (700, 0.3)])
+def test_many_signals_together_have_the_turning_points_of_each(n, noise):
+    rng = np.random.default_rng(n)
+    slow = np.array([0.5, 1.0, 1.5, 2.5, 3.0, 4.0, 0.7, 1.0])[:, None]
+    v = np.sin(2 * np.pi * slow * np.linspace(0.0, 1.0, n) + slow) * rng.uniform(5, 50, 8)[:, None]
+    v += noise * rng.standard_normal((8, n)) + rng.uniform(-9, 9, 8)[:, None]
+    v[6] = 3.0
+    length, closed = np.full(8, 100.0), np.arange(8) == 2
+    length[4] = 200.0 * np.ptp(v[4])
+    waves = many_waves(v, length, closed)
+    assert waves.count == 8
+    assert (np.diff(waves.stroke) >= 0).all()
+    for i in range(8):
+        mine = waves.stroke == i
+        if i in (2, 4, 6):  # a closed one, a line, and one that does not swing at all
+            assert not mine.any()
+            assert np.isnan([waves.mean[i], waves.spread[i]]).all()
+            continue
+        index, value = turning_points(v[i])
+        assert waves.index[mine] == pytest.approx(index, abs=1e-6)
+        assert waves.value[mine] == pytest.approx(value, abs=1e-9)
+        heights = np.abs(np.diff(value))
+        if len(heights):
+            assert waves.mean[i] == pytest.approx(heights.mean())
+            assert waves.spread[i] == pytest.approx(heights.max() - heights.min(), abs=1e-9)
+        else:
+            assert np.isnan(waves.mean[i])
+            assert np.isnan(waves.spread[i])
+    rows = [0, 1, 3, 5, 7]
+    joined = ManyWaves.joined([wave_heights(v[i]) for i in rows])
+    assert joined.count == 5
+    assert np.array_equal(np.array(rows)[joined.stroke], waves.stroke)
+    assert np.array_equal(joined.index, waves.index)
+    assert np.array_equal(joined.value, waves.value)
+    assert np.array_equal(joined.heights, waves.heights)
+
+
+def test_heights_of_many_are_between_neighbours_of_one_stroke():
+    waves = ManyWaves(3, np.array([0, 0, 0, 2, 2]), np.arange(5.0), np.array([5.0, -3, 4, 40, 10]))
+    assert waves.heights.tolist() == [8.0, 7.0, 30.0]
+    assert waves.mean == pytest.approx([7.5, np.nan, 30.0], nan_ok=True)
+    assert waves.spread == pytest.approx([1.0, np.nan, 0.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_signal_that_pauses_turns_where_one_without_pauses_does(seed):
+    rng = np.random.default_rng(seed)
+    v = np.cumsum(rng.standard_normal(80))
+    pauses = rng.integers(1, 4, len(v))
+    pauses[[0, -1]] = 3  # at rest before and after, as demonstrations are
+    first = np.cumsum(pauses) - pauses
+    least = 0.1 * np.ptp(v)
+    turns = np.sort(np.concatenate([find_peaks(s * v, prominence=least)[0] for s in (1.0, -1.0)]))
+    found = wave_heights(np.repeat(v, pauses)).index
+    assert len(found) == len(turns)
+    assert (np.abs(found - first[turns]) <= 0.5).all()
+
+
+def test_a_signal_is_a_line_below_a_share_of_the_start_goal_distance():
+    v = np.sin(np.linspace(0.0, 9.0, 200))
+    swing = np.ptp(v)
+    assert wave_heights(v, length=swing / 0.00799).heights.size == 0
+    assert wave_heights(v, length=swing / 0.00801).heights.size == 2
+
+
 def test_columns_are_read_at_the_extrema():
     t = np.arange(501) * 0.02
     wave = stroke_wave(stroke(), START, GOAL, UP)
     assert wave.at(t) == pytest.approx(wave.index * 0.02)
-    assert wave.at(stroke()).shape == (2, 3)
+    columns = wave.at(np.column_stack([t, 5.0 - 2.0 * t]))
+    expected = np.column_stack([wave.index * 0.02, 5.0 - 0.04 * wave.index])
+    assert columns == pytest.approx(expected)

@@ -104,3 +104,16 @@ def test_derivatives_of_a_known_motion():
     np.testing.assert_allclose(velocity[:, 0, 0], 10.0)
     np.testing.assert_allclose(acceleration[[0, 1, -2, -1], 0, 0], [500, 0, 0, -500], atol=1e-6)
     assert (len(velocity), len(acceleration), len(jerk)) == (500, 501, 502)
+
+
+def test_derivatives_of_a_known_turn_are_about_base_axes():
+    """0.8 rad about base z, minimum jerk in 10 s: 1.875, 5.7735 and 60 times the closed forms."""
+    velocity, acceleration, jerk = plan(stroke(turn=0.8)).derivatives()
+    at = np.argmax(velocity[:, 1, 2] ** 2)
+    assert abs(velocity[at, 1, 2]) == pytest.approx(1.875 * 0.08, rel=1e-3)
+    # The pen points down: its own z axis is base -z, and it turns about that.
+    turned = rotations.log(stroke(turn=0.8).rotation[-1] @ PEN_DOWN.T)
+    assert np.sign(velocity[at, 1, 2]) == np.sign(turned[2])
+    assert velocity[:, 1].sum(axis=0) * 0.02 == pytest.approx(turned, abs=1e-9)
+    assert np.abs(acceleration[:, 1]).max() == pytest.approx(5.7735 * 0.008, rel=1e-2)
+    assert np.abs(jerk[:, 1, :2]).max() < 1e-6

@@ -7,6 +7,7 @@ from dmpcli.errors import RefusedError
 from dmpcli.planning import preflight
 from dmpcli.planning.plan import PlannedStroke
 from tests.control.streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
+from tests.minimum_jerk import minimum_jerk
 
 
 def failed(checks):
@@ -151,3 +152,22 @@ def test_the_arm_must_stand_at_the_start():
 def test_what_is_not_a_number_passes_no_check():
     check = preflight.Check("speed", float("nan"), 250.0, "mm/s", None, None, "")
     assert not check.passed
+
+
+def test_the_peak_of_a_stroke_is_told_by_its_own_time_and_row_whatever_leads_to_it():
+    """Straight minimum jerk is fastest half-way, row 7 + 250, and bends most at 0.2113 of it."""
+    source = stroke(first_row=7)
+    way = LENGTH * minimum_jerk(source.t / 10.0)
+    straight = PlannedStroke(
+        "0", source.t, START + way[:, None] * [1.0, 0.0, 0.0], source.rotation, None, 7
+    )
+    for start, lead in (((START, PEN_DOWN), 0), ((START + [0.0, 60.0, 0.0], PEN_DOWN), 50)):
+        made = plan(straight, start=start, approach=100.0)
+        assert made.lead >= lead
+        checks = by_name(preflight.within_limits(made, straight, WIDE))
+        assert checks["speed"].t == pytest.approx(5.0, abs=0.03)
+        assert checks["speed"].row == pytest.approx(257, abs=2)
+        assert checks["speed"].value == pytest.approx(1.875 * LENGTH / 10.0, rel=1e-3)
+    bends = by_name(preflight.within_limits(plan(straight), straight, WIDE))["acceleration"]
+    assert min(abs(bends.t - at) for at in (2.113, 7.887)) < 0.05
+    assert bends.value == pytest.approx(5.7735 * LENGTH / 100.0, rel=1e-2)

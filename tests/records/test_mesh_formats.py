@@ -307,3 +307,10 @@ def test_a_damaged_byte_is_read_or_refused_and_nothing_else(form, at, value, sho
         assert len(str(error).splitlines()) == 1
     else:
         assert found.F.shape[1] == 3
+
+
+@pytest.mark.parametrize("place", ["1e165", "1e200", "9e299"])
+def test_a_corner_beyond_all_places_overflows_nothing_on_its_way_to_being_named(place):
+    text = f"v 0 0 0\nv 0 10 0\nv 10 {place} 0\nv 10 0 0\nf 1 2 3 4\n"
+    with pytest.raises(InputError, match=r"coordinates reach \S+e\+\d+ mm"):
+        mesh.decode(Source("a.obj", text.encode()))

@@ -166,14 +166,11 @@ def test_any_table_is_read_or_refused_by_name(text):
         assert "any.csv" in str(error)
 
 
-@given(st.text(alphabet="a,# \t\n\r", max_size=60))
-def test_lines_that_count_keep_their_numbers(text):
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-    kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip(" \t")[:1] not in ("", "#")]
-    joined, numbers = tables.counted_lines(Source("any.csv", text.encode()))
-    assert joined.decode() == "\n".join(line for _, line in kept)
-    if kept:
-        assert numbers.tolist() == [i for i, _ in kept]
+def test_a_row_that_comes_sooner_than_any_recorder_could_is_refused():
+    values = np.column_stack([T, XYZ])
+    values[1, 0] = values[0, 0] + 1e-320
+    with pytest.raises(InputError, match=r"line 3: comes .* after the row before"):
+        stroke(csv(values=values))
 
 
 def test_the_shortest_stroke_has_ten_samples():

@@ -26,8 +26,8 @@ def test_both_ways_give_the_same_numbers(rows):
 
 def test_numbers_are_parsed_at_once_and_names_and_stamps_stay_text():
     _, quick = both("id,t,x\n7,1700000000.123456789,1.5\n7,1700000000.223456789,2.5\n")
-    kinds = {name: values.type for name, values in quick.columns.items()}
-    assert kinds == {"id": pa.string(), "t": pa.string(), "x": pa.float64()}
+    assert [quick.columns[name].type for name in ("id", "t")] == [pa.string(), pa.string()]
+    assert quick.columns["x"].dtype == float
 
 
 @pytest.mark.parametrize("cell", ["", "nan", "inf", "abc", "1,5", "NULL"])

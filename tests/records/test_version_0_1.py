@@ -69,6 +69,18 @@ def test_a_trajectory_is_executed_and_all_of_it_reported(tmp_path):
     np.testing.assert_allclose(heights, [20.862, 20.845, 20.452], atol=6e-4)  # as it said itself
 
 
+def test_a_run_without_joints_leaves_as_ever_and_by_an_arm_in_joint_space(tmp_path):
+    ended("export", KEPT / "run.parquet", "-o", tmp_path / "run.csv", "-q")
+    said = ended("export", KEPT / "run.parquet", "-o", tmp_path / "run.joints.csv", expect=2)
+    assert "holds no joint angles" in said.stderr
+    arm = ["--robot-model", "ec66"]
+    ended("export", KEPT / "run.parquet", "-o", tmp_path / "run.joints.csv", *arm, "-q")
+    lines = [
+        len((tmp_path / name).read_text().splitlines()) for name in ("run.csv", "run.joints.csv")
+    ]
+    assert lines[0] == lines[1] > 100
+
+
 def test_a_journal_is_recovered(tmp_path):
     ended("recover", KEPT / "lost.journal", "-o", tmp_path / "found.parquet", "-q")
     found = dmpcli.read(tmp_path / "found.parquet")

@@ -95,3 +95,11 @@ def test_smallest_between_turns_a_onto_b_about_their_cross_product(a, b):
     R = rotations.smallest_between(a, b)
     np.testing.assert_allclose(R @ a, b, atol=1e-9)
     np.testing.assert_allclose(R @ np.cross(a, b), np.cross(a, b), atol=1e-9)
+
+
+def test_many_quaternions_are_the_same_bits_as_each_alone() -> None:
+    q = np.random.default_rng(4).normal(size=(20_000, 4))
+    R = rotations.from_quaternion(q)
+    alone = np.stack([rotations.from_quaternion(one) for one in q[8_180:8_210]])
+    np.testing.assert_array_equal(R[8_180:8_210], alone)
+    np.testing.assert_array_equal(R, rotations.from_quaternion(q[None])[0])

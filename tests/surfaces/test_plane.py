@@ -135,3 +135,28 @@ def test_charts_know_their_number_and_normals():
     charts = PlaneCharts(np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)))
     assert len(charts) == 4
     np.testing.assert_array_equal(charts.normal, np.tile([0.0, 0.0, 1.0], (4, 1)))
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_charts_of_some_pairs_are_theirs(closed):
+    rng = np.random.default_rng(5)
+    start, goal = rng.normal(size=(2, 5, 3)) * 80.0
+    normal = np.array([0.1, -0.3, 0.95])
+    charts = plane.pair_charts(start, goal, normal / np.linalg.norm(normal), closed)
+    rows = np.array([3, 1])
+    some = charts.rows(rows)
+    alone = plane.pair_charts(start[rows], goal[rows], normal / np.linalg.norm(normal), closed)
+    for name in ("origin", "axes", "goals", "lengths", "status", "normal"):
+        assert np.array_equal(getattr(some, name), getattr(alone, name)), name
+    assert (len(some), some.closed) == (2, closed)
+    uvw = rng.normal(size=(5, 4, 3))
+    lifted = charts.lift(uvw)
+    assert charts.coordinates(lifted.position) == pytest.approx(uvw)
+    over = charts.over(lifted.position)
+    assert (over.shape, over.dtype, over.all()) == ((5, 4), bool, True)
+    assert not lifted.outside.any()
+    if not closed:
+        assert charts.goals[:, 1] == pytest.approx(0.0, abs=1e-9)
+        assert (charts.lengths > 0.0).all()
+        assert charts.goals[:, 2] == pytest.approx(0.0, abs=1e-9)
+        assert charts.lengths == pytest.approx(np.linalg.norm(goal - start, axis=1))

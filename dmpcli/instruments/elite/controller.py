@@ -251,6 +251,16 @@ class Controller:
                 f"{failures[0]}; it may still be moving: press its emergency stop"
             )
 
+    def insist(self, method: str, params: Params) -> None:
+        """Have something done that must be: on a new connection where the old one is gone.
+
+        Raises
+        ------
+        InstrumentError, RefusedError
+            The controller does not do it.
+        """
+        self._over_any(method, params)
+
     def poll(self) -> None:
         """Make sure that the controller could be told to stop; asks it nothing.
 

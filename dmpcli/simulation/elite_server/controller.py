@@ -42,6 +42,9 @@ _IDENTITY: dict[str, Callable[[Params], Any]] = {
     "getSpeed": lambda _: 50.0,
 }
 
+_OUTPUTS = tuple(range(20))
+"""Numbers of the digital outputs, Y0 to Y19."""
+
 # s: the state says emergency stop only so long; get_estop_status says it for as long as it lasts.
 _BRIEF = 0.5
 # rad/s²: of moves at 100 % acceleration, full speed within about half a second.
@@ -79,6 +82,8 @@ class SimulatedController:
         When servo mode was first entered, s.
     refuses : bool
         Whether it takes no set-points.
+    outputs : dict of int
+        State of the digital outputs that were ever switched, by number.
     """
 
     def __init__(self, arm: JointArm, habits: Behaviour) -> None:
@@ -89,6 +94,7 @@ class SimulatedController:
         self.estop_since: float | None = None
         self.entered: float | None = None
         self.alarm = ""
+        self.outputs: dict[int, int] = {}
         self._transmission: Transmission | None = None
         self._acknowledges = True
         self._path: JointPath | None = None
@@ -107,6 +113,7 @@ class SimulatedController:
             "positiveKinematic": self._forward,
             "get_transparent_transmission_state": lambda _: int(self._transmission is not None),
             "getSoftVersion": lambda _: "virtual",
+            "getOutput": lambda params: self.outputs.get(params.choice("addr", _OUTPUTS), 0),
         } | _IDENTITY
         deeds: dict[str, Callable[[Params], Any]] = {
             "set_servo_status": self._set_servo,
@@ -115,6 +122,7 @@ class SimulatedController:
             "stop": lambda _: self.stop(),
             "pause": self._pause,
             "run": self._run,
+            "setOutput": self._set_output,
             "moveByJoint": self._move_joint,
             "moveByLine": self._move_line,
             "transparent_transmission_init": self._begin_transmission,
@@ -224,6 +232,10 @@ class SimulatedController:
         if not wanted:
             self.stop()
         self.servo = wanted
+        return True
+
+    def _set_output(self, params: Params) -> bool:
+        self.outputs[params.choice("addr", _OUTPUTS)] = params.choice("status", (0, 1))
         return True
 
     def _synchronise(self, _: Params) -> bool:

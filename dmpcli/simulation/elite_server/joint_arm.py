@@ -1,5 +1,6 @@
 """How the simulated EC66 moves: six position servos behind a command that a feed moves along."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -139,3 +140,11 @@ class JointArm:
         p, R, velocity = chain.forward_moving(self.model, self.joints, self.speeds, reach)
         tip = p + R @ reach
         return Posture(p, R, tip, R @ self.tool.tcp_rotation, velocity)
+
+
+class FeelingArm(JointArm):
+    """An arm whose tool meets the part by a physics of its own."""
+
+    @abstractmethod
+    def felt(self) -> Floats:
+        """What acts on the tool at the sensor, with its weight: shape (6,), N and N·m."""

@@ -19,7 +19,7 @@ from dmpcli.simulation.elite_server import monitor
 from dmpcli.simulation.elite_server.behaviour import Behaviour
 from dmpcli.simulation.elite_server.controller import SimulatedController
 from dmpcli.simulation.elite_server.faults import Event
-from dmpcli.simulation.elite_server.joint_arm import LAG, JointArm
+from dmpcli.simulation.elite_server.joint_arm import LAG, FeelingArm, JointArm
 from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
 from dmpcli.simulation.mock.contact import Solid, Wrist, contact
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN, SensorParameters
@@ -51,6 +51,9 @@ class LabParameters:
         Of the joints' servos, s.
     seed : int
         Of the sensor's noise and drift.
+    physics : callable, optional
+        Makes an arm that feels of the setting and its joints, shape (6,), rad; without it the arm
+        goes where it is led, and `ground` pushes back like a spring.
     """
 
     position: Floats
@@ -62,6 +65,7 @@ class LabParameters:
     events: tuple[Event, ...] = ()
     lag: float = LAG
     seed: int = 0
+    physics: "Callable[[LabParameters, Floats], FeelingArm] | None" = None
 
 
 def parked(arm: Arm, tool: Tool, position: Floats, rotation: Floats) -> Floats:
@@ -108,9 +112,11 @@ class VirtualLab:
     ) -> None:
         arm = model(ROBOT_MODEL)
         joints = parked(arm, setting.tool, setting.position, setting.rotation)
-        self.controller = SimulatedController(
-            JointArm(arm, setting.tool, joints, setting.lag), setting.habits
-        )
+        if setting.physics is None:
+            moved = JointArm(arm, setting.tool, joints, setting.lag)
+        else:
+            moved = setting.physics(setting, joints)
+        self.controller = SimulatedController(moved, setting.habits)
         self.lock = threading.RLock()
         self.drop: Callable[[str], None] = lambda _: None
         self._wrist = Wrist(setting.tool, setting.sensor, setting.seed)
@@ -139,11 +145,14 @@ class VirtualLab:
         with self.lock:
             self._advance(t)
             t = self._now
-            at = self.controller.arm.posture
-            force = contact(self._ground, at.position, at.velocity)
+            arm, noise = self.controller.arm, self._wrist.noise()
+            at, pull = arm.posture, np.zeros(6)
             if self._hand is not None:
-                force = force + self._hand.wrench(t, at.position, at.rotation, at.velocity)
-            return self._wrist.sensed(force, at.rotation, t - self._opened, self._wrist.noise())
+                pull = self._hand.wrench(t, at.position, at.rotation, at.velocity)
+            if isinstance(arm, FeelingArm):
+                return self._wrist.shown(arm.felt(), pull, at.rotation, t - self._opened, noise)
+            force = contact(self._ground, at.position, at.velocity) + pull
+            return self._wrist.sensed(force, at.rotation, t - self._opened, noise)
 
     def _advance(self, t: float) -> None:
         """Bring the lab up to `t`, through what happens meanwhile."""

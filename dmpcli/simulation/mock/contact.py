@@ -129,10 +129,21 @@ class Wrist:
         noise : array, shape (6,)
         """
         R = rotation @ self._sensor_in_tcp
-        return (
-            wrench.to_sensor(force, R, self._lever)
-            + wrench.of_weight(R, self._load, self._centre)
-            + self._zero
-            + age * self._drift
-            + noise
-        )
+        weight = wrench.of_weight(R, self._load, self._centre)
+        return self.shown(weight, force, rotation, age, noise)
+
+    def shown(
+        self, felt: Floats, force: Floats, rotation: Floats, age: float, noise: Floats
+    ) -> Floats:
+        """Return one reading where what acts at the sensor is known in part.
+
+        Parameters
+        ----------
+        felt : array, shape (6,)
+            At the sensor, sensor axes, with the tool's weight.
+        force, rotation, age, noise
+            What else acts on the tool, and the rest, as in `sensed`.
+        """
+        R = rotation @ self._sensor_in_tcp
+        pulled = wrench.to_sensor(force, R, self._lever)
+        return pulled + felt + self._zero + age * self._drift + noise

@@ -2,6 +2,7 @@
 
 from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InstrumentError
+from dmpcli.instruments import outputs
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo, ServoInfo
 from dmpcli.simulation.mock.arms import DraggedArm
 from dmpcli.simulation.mock.lab import Lab
@@ -122,6 +123,20 @@ class MockServo:
             return False
         lab.arm.send(position, rotation)
         return True
+
+    def check_output(self, name: str) -> None:
+        """Make sure that there is an output of this name: DO0 to DO31.
+
+        Raises
+        ------
+        InputError
+        """
+        outputs.number(name, "mock robot", 0, 31)
+
+    def switch(self, name: str, on: bool) -> None:
+        """Switch an output."""
+        self._lab.advance()
+        self._lab.outputs[name] = on
 
     def stop(self) -> None:
         """Leave servo mode or drag teaching and stand still at once."""

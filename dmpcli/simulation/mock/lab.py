@@ -29,12 +29,15 @@ class Lab:
     ----------
     hand : Hand or None
         Who holds the tool; nobody at first.
+    outputs : dict of bool
+        The robot's digital outputs that were ever switched.
     """
 
     def __init__(self, clock: Clock, scene: Scene | None = None) -> None:
         self.scene = Scene() if scene is None else scene
         self.clock = clock
         self.hand: Hand | None = None
+        self.outputs: dict[str, bool] = {}
         self.arm: ServoArm | DraggedArm = ServoArm(
             self.scene.position, self.scene.rotation, self.scene.servo
         )

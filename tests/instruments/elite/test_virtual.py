@@ -2,23 +2,26 @@
 
 import re
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dmpcli.control import guards, workcell
+from dmpcli.control import guards, outputs, workcell
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.playback import Playback
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import MonotonicClock
+from dmpcli.kinematics import chain, models
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import PlannedStroke, make
 from dmpcli.simulation.elite_server import faults
 from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.service import ControllerService
 from dmpcli.simulation.mock import PEN
+from dmpcli.spatial.output_events import OutputEvent
 
 START = np.array([-450.0, -120.0, 150.0])
 LIMITS = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
@@ -31,7 +34,8 @@ class Bench:
     def __init__(self, *specifications, tool=PEN, **options):
         said = faults.parse(specifications)
         setting = LabParameters(START, habits=said.habits, events=said.events)
-        self.service = ControllerService(VirtualLab(setting))
+        self.lab = VirtualLab(setting)
+        self.service = ControllerService(self.lab)
         # Both ends and the loop share one process here: nothing is said about how fast they are.
         slow = {"monitor_port": self.service.monitor_port, "lookahead": 0.5, "oldest": 0.5}
         given = slow | options
@@ -40,7 +44,7 @@ class Bench:
         self.clock = MonotonicClock()
         self.servo = workcell.connect(url, None, self.clock, tool=tool).robot
 
-    def loop(self, kind=ServoLoop, duration=1.0, interruption=None):
+    def loop(self, kind=ServoLoop, duration=1.0, events=()):
         info = self.servo.open()
         state = self.servo.state()
         assert state.mode == "ready"
@@ -49,10 +53,12 @@ class Bench:
         u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         way = state.position + u[:, None] * [20.0, 10.0, 0.0]
         stroke = PlannedStroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
+        stroke = replace(stroke, events=events)
         here = (state.position, state.rotation)
         plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
-        arm = ReadyArm(self.servo, info, self.clock)
-        return kind(plan, LIMITS, StopLimits(5.0, 0.1, 50.0, 5.0), arm), way
+        arm = ReadyArm(self.servo, info, self.clock).as_told()
+        switch = outputs.OutputSwitch(self.servo, PERIOD, info.lookahead) if events else None
+        return kind(plan, LIMITS, StopLimits(5.0, 0.1, 50.0, 5.0), arm, outputs=switch), way
 
     def close(self):
         self.servo.close()
@@ -97,6 +103,10 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     assert gaps.max() < 0.3
     assert len(actual) > 40
     assert set(columns["state"]) == {"ready"}
+    # The joints of each row are those that its pose was made of.
+    joints = np.column_stack([columns[f"q{i}"] for i in range(1, 7)])
+    flange, turned = chain.forward(models.model("ec66"), joints)
+    np.testing.assert_allclose(flange + turned @ PEN.tcp_position, actual, atol=1e-6)
 
 
 @pytest.mark.slow
@@ -217,3 +227,28 @@ def test_an_arm_that_gets_no_more_set_points_stands_or_says_so(bench, habit):
     state = made.servo.state()
     np.testing.assert_allclose(state.position, at, atol=0.05)
     assert (state.mode == "fault") == (habit == "alarm")
+
+
+@pytest.mark.slow
+def test_outputs_are_switched_on_the_way_and_off_at_its_end(bench):
+    made = bench()
+    loop, way = made.loop(
+        events=(OutputEvent(0.3, "DO1", on=True), OutputEvent(0.7, "DO4", on=True))
+    )
+    assert loop.run(Interruption()).reason == DONE
+    assert made.lab.controller.outputs == {1: 0, 4: 0}
+    columns = loop.log.columns()
+    rows = {text: i for i, text in enumerate(columns["event"]) if text}
+    assert list(rows) == ["on DO1", "on DO4"]
+    actual = np.column_stack([columns[name] for name in "xyz"])
+    # 24 mm in a second: 0.9 mm in a period at the fastest, and the monitor is 8 ms behind.
+    for text, sample in (("on DO1", 30), ("on DO4", 70)):
+        assert np.linalg.norm(actual[rows[text]] - way[sample]) < 1.5
+
+
+@pytest.mark.slow
+def test_an_output_that_is_on_goes_off_with_an_emergency_stop(bench):
+    made = bench("estop@0.6")
+    loop, _ = made.loop(events=(OutputEvent(0.05, "DO1", on=True),))
+    assert isinstance(loop.run(Interruption()).failure, RefusedError)
+    assert made.lab.controller.outputs == {1: 0}

@@ -1,0 +1,104 @@
+"""What a table costs beside its drawing. ``python -m benchmarks.long_tables FOLDER [ROWS ...]``.
+
+A CSV table of so many pairs (100,000 and 10,000,000) is read, checked and written as a batch whose
+drawing is replaced by nothing: what is left is the table, the ledger and the manifest. Each length
+has a process of its own; processor time per pair, and the largest memory. ``resume`` instead of
+lengths: 5,000 parts that were drawn, and the run that goes on from them.
+"""
+
+import contextlib
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cluster_demo import BIN
+from dmpcli.batch import workers
+from dmpcli.batch.part import Job, Outcome, Part
+
+COLUMNS = "id,x0,y0,z0,xg,yg,zg"
+AT_ONCE = 100_000
+
+
+def table(place: Path, rows: int) -> Path:
+    """Write a table of level pairs with ids."""
+    path = place / f"pairs-{rows}.csv"
+    if path.exists():
+        return path
+    rng = np.random.default_rng(0)
+    with path.open("w") as stream:
+        stream.write(COLUMNS + "\n")
+        for first in range(0, rows, AT_ONCE):
+            count = min(AT_ONCE, rows - first)
+            start = rng.uniform(-300, 300, (count, 2)).round(3)
+            goal = (start + rng.uniform([40, -60], [100, 60], (count, 2))).round(3)
+            for i, (a, b) in enumerate(zip(start.tolist(), goal.tolist(), strict=True), first):
+                stream.write(f"p{i},{a[0]},{a[1]},0,{b[0]},{b[1]},0\n")
+    return path
+
+
+def nothing(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
+    """Draw nothing: each part is a file of one byte."""
+    for part in parts:
+        file = Path(job.folder) / job.file_of(part.number)
+        file.parent.mkdir(exist_ok=True)
+        file.write_bytes(b"0")
+        yield Outcome(part.number, {}, {}, 0, rows=len(part), size=1)
+
+
+def alone(place: Path, rows: int, *more: str) -> None:
+    """Run one command here, and print what it took."""
+    from dmpcli.cli import main as command_line
+
+    workers.here = nothing
+    path = table(place, rows)
+    words = ["generalize", place / "skill.json", "-o", place / f"batch-{rows}", "--pairs", path]
+    sys.argv = ["dmpcli", *map(str, words), "-q", *more]
+    begin = time.process_time()
+    with contextlib.suppress(SystemExit):
+        command_line()
+    assert (place / f"batch-{rows}" / "_manifest.json").exists()
+    spent = time.process_time() - begin
+    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"| {rows} {' '.join(more)} | {spent:.1f} | {1e6 * spent / rows:.2f} | {largest:.0f} |")
+
+
+def resume(place: Path) -> None:
+    """Print what it takes to go on from 5,000 parts."""
+    path = table(place, 5_000)
+    words = [BIN / "dmpcli", "generalize", place / "skill.json", "-o", place / "many"]
+    words += ["--pairs", path, "--pairs-per-part", "1", "--rate", "10", "-q"]
+    for shard in ("1/2", "2/2"):
+        subprocess.run([*words, "--shard", shard], check=True)
+    begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(words, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    print(f"going on from 5,000 parts: {time.perf_counter() - begin:.1f} s, processor {used:.1f} s")
+
+
+def main() -> None:
+    """Print a Markdown table."""
+    place = Path(sys.argv[1])
+    place.mkdir(parents=True, exist_ok=True)
+    if not (place / "skill.json").exists():
+        fit = [BIN / "dmpcli", "fit", "sample_runs/reference.parquet", "-o", place / "skill.json"]
+        subprocess.run([*fit, "-q"], check=True)
+    if sys.argv[2:] == ["resume"]:
+        resume(place)
+    elif sys.argv[2:3] == ["alone"]:
+        alone(place, int(sys.argv[3]), *sys.argv[4:])
+    else:
+        print("| pairs | processor s | µs a pair | MiB at most |")
+        print("| --- | ---: | ---: | ---: |", flush=True)
+        for rows in sys.argv[2:] or ["100000", "10000000"]:
+            words = [sys.executable, "-m", "benchmarks.long_tables", place, "alone", rows]
+            subprocess.run(words, check=True)
+
+
+if __name__ == "__main__":
+    main()

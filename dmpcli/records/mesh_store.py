@@ -1,0 +1,209 @@
+"""Prepared meshes kept in a folder: what a mesh file becomes is found once, by whoever comes first.
+
+A mesh is known by the content of its file, its unit, its pose, and the versions of the programs
+that prepare it; what comes back is bit by bit what would be found anew. Writers need not know of
+one another: each entry is written beside its name and renamed when whole, and one that cannot be
+read is as good as none.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+
+from dmpcli.arrays import AnyArray, Floats, Integers
+from dmpcli.records import file_io, surface
+from dmpcli.records.file_io import Source
+from dmpcli.records.mesh import MeshFile
+from dmpcli.spatial.pose import Pose
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.triangle_mesh import MeshParts
+from dmpcli.version import __version__
+
+FORMAT = 1
+
+LARGEST = 8 * 2**30
+"""Bytes that a folder holds; beyond them what was used longest ago goes."""
+
+_SUFFIX = ".mesh"
+_OFTEN = 16
+"""The folder is looked through once in so many entries."""
+
+_HELD = 2
+"""Meshes as read, before they are placed, that are held for their next pose."""
+
+
+@dataclass
+class MeshStore:
+    """Reads surfaces, and keeps what meshes become.
+
+    Attributes
+    ----------
+    folder : str or None
+        Without one only the last meshes are held, for their next pose.
+    largest : int
+        Bytes.
+    """
+
+    folder: str | None = None
+    largest: int = LARGEST
+    _held: dict[tuple[str, str | None], MeshFile] = field(default_factory=dict, repr=False)
+    _written: int = field(default=0, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What is held stays; another process begins with nothing.
+        return vars(self) | {"_held": {}, "_written": 0}
+
+    def load(
+        self, source: Source, unit: str | None = None, pose: Pose | None = None
+    ) -> surface.Exact | tuple[MeshFile, Mesh]:
+        """Read a surface and place it, as `surface.load`.
+
+        Returns
+        -------
+        Plane, Cylinder, Sphere, or tuple of MeshFile and Mesh
+            In the base frame, mm.
+
+        Raises
+        ------
+        InputError
+            As `surface.load`.
+        """
+        entry = None if self.folder is None else self._entry(source, unit, pose)
+        if entry is not None:
+            kept = _kept(entry)
+            if kept is not None:
+                with contextlib.suppress(OSError):
+                    os.utime(entry)
+                return kept
+        found = self._read(source, unit)
+        if not isinstance(found, MeshFile):
+            return found if pose is None else surface.placed(found, pose)
+        if pose is not None:
+            found = found._replace(V=pose.apply(found.V))
+        mesh = Mesh(found.V, found.F)
+        if entry is not None:
+            self._keep(entry, found, mesh)
+        return found, mesh
+
+    def _read(self, source: Source, unit: str | None) -> surface.Exact | MeshFile:
+        key = (source.sha256, unit)
+        found = self._held.pop(key, None) or surface.load(source, unit)
+        if isinstance(found, MeshFile):
+            self._held[key] = found
+            while len(self._held) > _HELD:
+                del self._held[next(iter(self._held))]
+        return found
+
+    def _entry(self, source: Source, unit: str | None, pose: Pose | None) -> Path:
+        assert self.folder is not None
+        placed = (
+            None if pose is None else [*pose.position.tolist(), *pose.rotation.ravel().tolist()]
+        )
+        made_by = [FORMAT, __version__, np.__version__, scipy.__version__, _igl_version()]
+        told = json.dumps([source.sha256, unit or "mm", placed, made_by])
+        return Path(self.folder) / (hashlib.sha256(told.encode()).hexdigest() + _SUFFIX)
+
+    def _keep(self, entry: Path, found: MeshFile, mesh: Mesh) -> None:
+        """Write an entry; one that cannot be written is done without."""
+        with contextlib.suppress(OSError):
+            entry.parent.mkdir(parents=True, exist_ok=True)
+            temporary, stream = file_io.temporary_of(entry)
+            try:
+                with stream:
+                    np.savez(stream, **_packed(found, mesh))  # type: ignore[arg-type]
+                temporary.replace(entry)
+            finally:
+                temporary.unlink(missing_ok=True)
+            self._written += 1
+            if self._written % _OFTEN == 1:
+                self._bound(entry.parent)
+
+    def _bound(self, folder: Path) -> None:
+        """Remove what was used longest ago, until the folder holds no more than it may."""
+        entries = []
+        with os.scandir(folder) as found:
+            for one in found:
+                if one.name.endswith(_SUFFIX):
+                    with contextlib.suppress(OSError):  # another one removes them too
+                        known = one.stat()
+                        entries.append((known.st_mtime_ns, known.st_size, one.path))
+        size = sum(one[1] for one in entries)
+        for _, bytes_of, path in sorted(entries):
+            if size <= self.largest:
+                break
+            with contextlib.suppress(OSError):
+                os.unlink(path)
+            size -= bytes_of
+
+
+def _igl_version() -> str:
+    from importlib.metadata import version
+
+    return version("libigl")
+
+
+def _packed(found: MeshFile, mesh: Mesh) -> dict[str, AnyArray]:
+    """Return the arrays of an entry: numbers of vertices and faces in four bytes each.
+
+    Most corners of one vertex have one normal: the vertex', and the others as they are.
+    """
+    parts = mesh.parts
+    normals = np.zeros((len(mesh.V), 3))
+    normals[mesh.F] = parts.corner_normals
+    # Bit by bit: -0.0 is another number than 0.0 here.
+    own, of_vertex = parts.corner_normals, normals[mesh.F]
+    other = (own.view(np.int64) != of_vertex.view(np.int64)).any(axis=-1)
+    packed: dict[str, AnyArray] = {
+        "V": mesh.V,
+        "F": mesh.F.astype(np.int32),
+        "neighbours": parts.neighbours.astype(np.int32),
+        "normals": normals,
+        "other": np.flatnonzero(other).astype(np.int32),
+        "others": own[other],
+        "heights": parts.heights,
+        "remarks": np.frombuffer(json.dumps(found.remarks).encode(), dtype=np.uint8),
+    }
+    if parts.components.any():
+        packed["components"] = parts.components.astype(np.int32)
+    if parts.noise.any():
+        packed["noise"] = parts.noise
+    return packed
+
+
+def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
+    """Return the mesh of an entry; None where there is none, or a damaged one."""
+    try:
+        with np.load(entry, allow_pickle=False) as packed:
+            held = {name: packed[name] for name in packed.files}
+        F = _whole(held["F"])
+        normals = held["normals"][F]
+        normals.reshape(-1, 3)[held["other"]] = held["others"]
+        zeros = np.zeros(len(F))
+        parts = MeshParts(
+            _whole(held["neighbours"]),
+            _whole(held["components"]) if "components" in held else zeros.astype(np.int64),
+            normals,
+            held.get("noise", zeros),
+            held["heights"],
+        )
+        remarks = json.loads(held["remarks"].tobytes())
+    except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
+        return None
+    mesh = Mesh.with_parts(_floats(held["V"]), F, parts)
+    return MeshFile(mesh.V, mesh.F, remarks), mesh
+
+
+def _whole(values: AnyArray) -> Integers:
+    return values.astype(np.int64)
+
+
+def _floats(values: AnyArray) -> Floats:
+    return values.astype(float)

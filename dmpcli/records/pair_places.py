@@ -1,0 +1,147 @@
+"""Where each pair of a table lies: its surface with unit and pose, whose axes, how high.
+
+The words of the table are kept as they stand; `workflows` makes files of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.records.layouts import LENGTH
+from dmpcli.records.schemas import OK
+from dmpcli.records.tables import Table, is_text
+
+COLUMNS = ("surface", "surface_unit", "pose", "in", "offset")
+
+AXES = ("base", "part")
+"""In whose axes a pair is given: the robot's base, or the surface's own."""
+
+FARTHEST_OFFSET = 1e3
+"""Stand-offs beyond this, mm, are a mistake."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where pairs lie, in the words of a table; an empty one where it says nothing.
+
+    Attributes
+    ----------
+    surface : str
+        File, relative to the table.
+    unit : str
+        Of its lengths.
+    pose : str
+        A file, relative to the table, or ``X Y Z RX RY RZ``.
+    axes : str
+        Of `AXES`.
+    offset : float or None
+        Off the surface, mm.
+    """
+
+    surface: str = ""
+    unit: str = ""
+    pose: str = ""
+    axes: str = ""
+    offset: float | None = None
+
+
+@dataclass(frozen=True)
+class PairPlaces:
+    """The places of a table of B pairs.
+
+    Attributes
+    ----------
+    columns : list of str
+        Which of `COLUMNS` the table has.
+    places : list of Place
+        All different, in the order in which the table first names them.
+    of : array of int, shape (B,)
+        The place of each pair.
+    """
+
+    columns: list[str]
+    places: list[Place]
+    of: Integers
+
+
+def read(table: Table, status: list[str]) -> PairPlaces | None:
+    """Return the places of a table; None where it names none.
+
+    Parameters
+    ----------
+    table : Table
+    status : list of str
+        Of each row; what is wrong with a place is written into it.
+    """
+    present = [name for name in COLUMNS if name in table.columns]
+    if not present:
+        return None
+    codes, words = [], []
+    for name in COLUMNS:
+        code, known = _coded(table, name) if name in present else (None, [""])
+        codes.append(np.zeros(len(table), dtype=np.int64) if code is None else code)
+        words.append(known)
+    stacked = np.stack(codes, axis=1)
+    joined = np.ravel_multi_index(tuple(stacked.T), tuple(len(known) for known in words))
+    _, first, of = np.unique(joined, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    places = []
+    for i, row in enumerate(np.sort(first).tolist()):
+        said = dict(
+            zip(COLUMNS, (w[c] for w, c in zip(words, stacked[row], strict=True)), strict=True)
+        )
+        place, odd = _place(said)
+        places.append(place)
+        if odd is not None:
+            column, what = odd
+            _mark(table, status, rank[of.reshape(-1)] == i, column, what)
+    return PairPlaces(present, places, rank[of.reshape(-1)])
+
+
+def _coded(table: Table, name: str) -> tuple[Integers, list[str]]:
+    """Number of each row's word, shape (rows,), and the words, without blanks about them."""
+    values = table.columns[name]
+    if isinstance(values, np.ndarray) or not is_text(values.type):
+        values = pa.array(table.texts(name))
+    words = pc.utf8_trim_whitespace(values.fill_null("")).dictionary_encode()
+    return np.asarray(words.indices).astype(np.int64), words.dictionary.to_pylist()
+
+
+def _place(said: dict[str, str]) -> tuple[Place, tuple[str, str] | None]:
+    """Return a place, and which of its words is none and why."""
+    odd: tuple[str, str] | None = None
+    if said["surface_unit"] not in ("", *LENGTH):
+        odd = "surface_unit", f"is none of {', '.join(LENGTH)}"
+    if said["in"] not in ("", *AXES):
+        odd = odd or ("in", f"is neither {' nor '.join(AXES)}")
+    offset = None
+    if said["offset"]:
+        offset = _number(said["offset"])
+        if offset is None or not abs(offset) <= FARTHEST_OFFSET:
+            odd = odd or ("offset", f"is no number of mm up to {FARTHEST_OFFSET:g}")
+            offset = None
+    place = Place(said["surface"], said["surface_unit"], said["pose"], said["in"], offset)
+    return place, odd
+
+
+def _number(word: str) -> float | None:
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None
+
+
+def _mark(table: Table, status: list[str], bad: Booleans, column: str, what: str) -> None:
+    for row in np.flatnonzero(bad).tolist():
+        if status[row] == OK:
+            status[row] = f"{table.at(row)}, column {column!r}: {table.shown(column, row)} {what}"
+
+
+def offsets(places: PairPlaces, otherwise: float) -> Floats:
+    """Return the stand-off at each place, mm; `otherwise` where the table says none."""
+    said = [otherwise if place.offset is None else place.offset for place in places.places]
+    return np.array(said, dtype=float)

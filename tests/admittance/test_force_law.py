@@ -1,0 +1,180 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmpcli.admittance.contact_estimation import (
+    RiseTest,
+    delay_of_move,
+    line,
+    static_stiffness,
+)
+from dmpcli.admittance.force_coupling import fast_filter, follow
+from dmpcli.admittance.force_law import ForceGains, LawState, advance, by_rule
+from dmpcli.admittance.force_stability import (
+    growth,
+    is_stable,
+    largest_stiffness,
+    smallest_damping,
+)
+from dmpcli.admittance.oscillation import AlternationDetector
+
+PERIOD = 0.02
+
+
+def closed_loop(gains, stiffness, delay, cycles, sub=20):
+    """An oracle in continuous time: e runs evenly between cycles and is felt a delay later."""
+    dt = gains.period / sub
+    held = [0.0] * (round(delay / dt) + 1)
+    state, e, out = LawState(1.0), 1.0, []
+    for _ in range(cycles):
+        before, felt = e, -stiffness * held[0]
+        state = advance(gains, state, felt, math.inf)
+        e = state.e
+        for n in range(sub):
+            held.append(before + (e - before) * (n + 1) / sub)
+            held.pop(0)
+        out.append(state.e)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 20.0])
+@pytest.mark.parametrize("delay", [0.03, 0.08, 0.16])
+def test_the_predicted_bound_is_where_a_loop_in_continuous_time_begins_to_grow(stiffness, delay):
+    bound = smallest_damping(stiffness, delay, PERIOD)
+    for share, grows in ((0.6, True), (1.6, False)):
+        D = share * bound
+        gains = ForceGains(PERIOD * D, D, 0.0, math.inf, PERIOD)
+        swing = np.abs(closed_loop(gains, stiffness, delay, 800))
+        assert (swing[-100:].max() > swing[100:200].max()) == grows
+
+
+@given(st.floats(0.05, 200.0), st.floats(0.01, 0.4), st.sampled_from([0.004, 0.01, 0.02, 0.04]))
+def test_gains_by_the_rule_are_stable_with_some_to_spare(stiffness, delay, period):
+    gains = by_rule(stiffness, delay + period / 2.0, period)
+    assert is_stable(gains, stiffness, delay)
+    assert largest_stiffness(gains, delay) > 1.1 * stiffness
+    assert not is_stable(gains, 2.0 * stiffness, delay)
+
+
+def test_for_a_pure_delay_the_bound_is_the_known_one():
+    """In continuous time an integrator k/(D s) behind a delay L is stable below D = 2 k L / π."""
+    bound = smallest_damping(3.0, 0.2, 0.001)
+    assert bound == pytest.approx(2.0 / math.pi * 3.0 * 0.2, rel=0.02)
+
+
+def test_a_growing_loop_is_told_from_a_dying_one_by_its_eigenvalue():
+    gains = by_rule(2.0, 0.1, PERIOD)
+    assert growth(gains, 2.0, 0.09) < 1.0 < growth(gains, 4.0, 0.09)
+
+
+def test_the_integral_takes_away_what_a_receding_surface_leaves():
+    gains, k, v = by_rule(2.0, 0.06, PERIOD), 2.0, 1.0
+    state, depth, force = LawState(), 0.0, 5.0
+    for _ in range(500):
+        state = advance(gains, state, force - 5.0, 10.0)
+        depth += v * PERIOD
+        force = 5.0 - k * (state.e + depth)
+    assert force == pytest.approx(5.0, abs=1e-3)
+
+
+def test_at_its_largest_speed_nothing_winds_up():
+    gains, state = by_rule(2.0, 0.06, PERIOD), LawState()
+    for _ in range(200):
+        state = advance(gains, state, -5.0, 3.0)
+    assert state.saturated
+    assert state.speed == -3.0
+    assert abs(state.integral) <= 5.0 * PERIOD + 1e-12
+
+
+@given(st.floats(0.05, 50.0), st.floats(0.01, 0.3), st.floats(0.5, 20.0), st.floats(-15.0, 15.0))
+def test_when_e_has_ended_what_it_added_decays_and_the_goal_is_reached(k, delay, tau, e):
+    """Over random stable gains: e is held, released, and the filter of eq. (10) forgets it."""
+    assert is_stable(by_rule(k, delay + PERIOD / 2.0, PERIOD), k, delay)
+    filter_, state = fast_filter(tau, PERIOD), np.zeros(2)
+    for _ in range(100):
+        state = follow(filter_, state, e)
+    assert state[0] == pytest.approx(e, abs=1e-9)
+    for _ in range(100):
+        state = follow(filter_, state, 0.0)
+    assert abs(state[0]) < 1e-9
+
+
+# --- what a landing tells
+
+
+def test_a_line_is_found_with_how_well_it_is_known():
+    rng = np.random.default_rng(1)
+    depth = np.linspace(0.0, 1.0, 30)
+    found = line(depth.tolist(), (0.5 + 3.0 * depth + 0.05 * rng.standard_normal(30)).tolist())
+    slope, offset = np.polyfit(depth, 0.5 + 3.0 * depth, 1)
+    assert found.slope == pytest.approx(slope, abs=4.0 * found.deviation)
+    assert found.offset == pytest.approx(offset, abs=0.1)
+    assert 0.01 < found.deviation < 0.1
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.04])
+@pytest.mark.parametrize("delay", [0, 3, 7])
+@pytest.mark.parametrize("way", [0.3, -0.7])
+def test_the_delay_is_that_of_the_move_whatever_its_shape(lag, delay, way):
+    k, T = 4.0, 0.001
+    led = np.clip(np.arange(1500) * T * 2.0, 0.0, abs(way)) * np.sign(way)
+    lagging, x = [], 0.0
+    for value in led:
+        x = value if lag == 0.0 else x + (value - x) * (1.0 - math.exp(-T / lag))
+        lagging.append(x)
+    felt = 2.0 + k * np.concatenate([np.zeros(delay * 10), lagging])[: len(led)]
+    rested = ((0.0, 2.0), (float(led[-1]), 2.0 + k * float(led[-1])))
+    found = delay_of_move(list(zip(led, felt, strict=True)), rested, T)
+    assert found == pytest.approx(0.01 * delay + lag, abs=0.002)
+
+
+def test_two_resting_points_tell_the_stiffness_unless_they_are_one():
+    assert static_stiffness((1.0, 1.5), (2.0, 4.0), 1.0) == pytest.approx(4.0)
+    assert static_stiffness((1.0, 1.5), (2.0, 2.1), 1.0) is None
+    assert static_stiffness((1.5, 1.0), (2.0, 4.0), 1.0) is None
+
+
+def test_a_reading_that_stays_while_the_tool_moves_in_is_no_contact():
+    test = RiseTest(slack=0.3)
+    assert all(test.believed(1.0, 5.0, 0.01 * n, 2.0) for n in range(400))
+    assert not test.believed(1.0, 5.0, 4.5, 2.0)
+
+
+def test_a_force_that_rises_as_it_should_is_believed():
+    test = RiseTest(slack=0.3)
+    assert all(test.believed(0.5 + 2.0 * 0.01 * n, 5.0, 0.01 * n, 2.0) for n in range(1000))
+
+
+# --- swinging
+
+
+def swings(signal, size=1.0, count=5, window=2.0, rate=50.0):
+    detector = AlternationDetector(size, count, window)
+    times = [n / rate for n, value in enumerate(signal) if detector.feel(n / rate, value)]
+    return times[0] if times else None
+
+
+def test_an_oscillation_is_named_within_its_count_of_half_periods():
+    t = np.arange(0.0, 6.0, 0.02)
+    assert 4 * 0.25 - 0.1 < swings(2.0 * np.sin(2.0 * np.pi * 2.0 * t)) < 5 * 0.25
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_steps_and_slow_changes_are_no_oscillation(seed):
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 20.0, 0.02)
+    noise = 0.1 * rng.standard_normal(len(t))
+    assert swings(noise) is None
+    assert swings(noise + 5.0 * (t > 5.0)) is None
+    assert swings(noise + 3.0 * np.sin(2.0 * np.pi * 0.2 * t)) is None
+
+
+def test_what_dies_away_is_told_from_what_grows():
+    t = np.arange(0.0, 3.0, 0.02)
+    for growth_, grows in ((0.5, True), (-0.7, False)):
+        detector = AlternationDetector(0.3, 6, 3.0)
+        for at in t:
+            detector.feel(at, 2.0 * np.exp(growth_ * at) * np.sin(2.0 * np.pi * 2.0 * at))
+        assert detector.grows == grows

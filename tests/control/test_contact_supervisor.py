@@ -1,0 +1,258 @@
+import numpy as np
+import pytest
+
+from dmpcli.admittance.force_law import ForceGains
+from tests.control.contact_plant import PERIOD, Plant, Rig
+
+
+def rms(pairs):
+    return float(np.sqrt(np.mean((pairs[:, 0] - pairs[:, 1]) ** 2)))
+
+
+def wavy(height, amplitude=0.4, period=6.0, rig=None):
+    """A surface that is still until the stroke begins."""
+    begun = []
+
+    def surface(t):
+        if not begun and rig and rig[0].supervisor.settled:
+            begun.append(t)
+        return height + (amplitude * np.sin(2 * np.pi * (t - begun[0]) / period) if begun else 0.0)
+
+    return surface
+
+
+def drawn(stiffness, cycles, seed=0, height=-1.5, **policy):
+    rig = []
+    surface = wavy(height, rig=rig)
+    rig.append(Rig(Plant(stiffness, cycles, surface=surface, seed=seed), **policy))
+    return rig[0], rig[0].land().draw(12.0)
+
+
+@pytest.mark.parametrize("cycles", [0, 1, 2, 4])
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
+def test_the_force_is_held_and_the_contact_measured_at_any_stiffness_and_delay(stiffness, cycles):
+    rig, pairs = drawn(stiffness, cycles)
+    found = rig.supervisor
+    assert not found.failure
+    assert found.stiffness == pytest.approx(stiffness, rel=0.05)
+    lag = PERIOD * cycles + rig.plant.lag + 0.03  # with half the filter, a period's half, the mean
+    assert found.delay == pytest.approx(lag, abs=0.02)
+    assert rms(pairs) < (0.15 if stiffness <= 5.0 else 0.55)
+    assert pairs[:, 0].min() > 2.5
+    assert found.landing_peak < (1.5 * 5.0 if stiffness <= 15.0 else 9.0)
+
+
+@pytest.mark.parametrize("height", [-5.0, -2.0, 0.0, 2.0, 5.0])
+@pytest.mark.parametrize("stiffness", [2.0, 15.0])
+def test_a_surface_off_the_plan_is_landed_on_gently(height, stiffness):
+    rig = Rig(Plant(stiffness, 1, surface=lambda t: height))
+    rig.land()
+    assert rig.supervisor.settled
+    assert rig.supervisor.landing_peak <= 1.5 * 5.0
+    assert rig.states == ["free", "seeking", "landing", "drawing"]
+
+
+@pytest.mark.parametrize("bias", [-1.2, 1.2])
+def test_a_zero_that_is_off_is_taken_anew_before_contact(bias):
+    rig = Rig(Plant(2.0, 1, bias=bias))
+    pairs = rig.land().draw(6.0)
+    assert abs(pairs[:, 0].mean() - 5.0) < 0.05
+
+
+def test_a_zero_that_is_far_off_is_refused():
+    rig = Rig(Plant(2.0, bias=3.0)).land()
+    assert "coupling_zero_limit" in rig.supervisor.failure
+
+
+def test_a_tool_that_is_still_pressed_when_lifted_is_no_zero():
+    rig = Rig(Plant(0.5, surface=lambda t: 9.0), zero_limit=100.0).land()
+    assert "still pressed" in rig.supervisor.failure
+
+
+def test_without_a_surface_it_says_how_far_it_has_looked():
+    rig = Rig(Plant(2.0, surface=lambda t: None)).land()
+    assert "no contact within 6 mm of the plan" in rig.supervisor.failure
+    assert rig.peak == 0.0
+
+
+def test_an_offset_that_comes_while_it_seeks_is_no_contact():
+    plant = Plant(2.0, surface=lambda t: None)
+    rig = Rig(plant)
+    while rig.supervisor.state != "seeking":
+        rig.cycle()
+    plant.bias = 1.0
+    rig.land()
+    assert not rig.supervisor.settled
+    assert "no contact" in rig.supervisor.failure
+
+
+def test_a_zero_that_jumps_far_in_the_air_is_no_contact_either():
+    plant = Plant(2.0, surface=lambda t: None)
+    rig = Rig(plant)
+    while rig.supervisor.state != "seeking":
+        rig.cycle()
+    plant.bias = 4.0
+    rig.land()
+    assert not rig.supervisor.settled
+    assert "no contact" in rig.supervisor.failure
+
+
+def after(rig, change):
+    """A surface that changes some seconds into the stroke."""
+    begun = []
+
+    def surface(t):
+        if rig and rig[0].supervisor.settled and not begun:
+            begun.append(t)
+        return change(t - begun[0]) if begun else 0.0
+
+    return surface
+
+
+def changing(stiffness, change, cycles=1, **policy):
+    rig = []
+    rig.append(Rig(Plant(stiffness, cycles, surface=after(rig, change)), **policy))
+    return rig[0], rig[0].land().draw(8.0)
+
+
+def test_a_step_down_is_found_again():
+    rig, pairs = changing(2.0, lambda t: 0.0 if t < 2.0 else -3.0)
+    assert not rig.supervisor.failure
+    assert np.mean(pairs[150:, 0] > 0.5) >= 0.995
+    assert abs(pairs[-100:, 0].mean() - 5.0) < 0.1
+
+
+def test_the_end_of_the_part_stops_it_and_is_named():
+    rig, _ = changing(2.0, lambda t: 0.0 if t < 2.0 else None)
+    assert "was lost and not found again within 6 mm" in rig.supervisor.failure
+    assert rig.supervisor.state == "lost"
+    assert "seeking" in rig.states[4:]
+
+
+def test_where_asked_a_loss_stops_at_once_or_is_waited_out():
+    rig, _ = changing(2.0, lambda t: 0.0 if t < 2.0 else None, on_loss="stop")
+    assert "--on-contact-loss stop" in rig.supervisor.failure
+    rig, pairs = changing(2.0, lambda t: 0.0 if not 2.0 < t < 4.0 else None, on_loss="hold")
+    assert not rig.supervisor.failure
+    assert "lost" in rig.states
+    assert abs(pairs[-50:, 0].mean() - 5.0) < 0.2
+
+
+@pytest.mark.parametrize("stiffness", [2.0, 10.0])
+def test_a_ramp_steeper_than_it_can_follow_stops_it_near_the_set_point(stiffness):
+    rig, pairs = changing(stiffness, lambda t: min(max(t - 2.0, 0.0) * 8.7, 3.0))
+    peak = pairs[:, 0].max()
+    if rig.supervisor.failure:
+        assert rig.supervisor.urgent
+        assert rig.supervisor.state == "too hard"
+    # What the loop's reaction makes unavoidable beyond the limit of 10 N.
+    assert peak < 10.0 + 8.7 * stiffness * 0.12
+    assert stiffness < 5.0 or rig.supervisor.failure
+
+
+def test_a_side_force_that_is_no_friction_is_a_wall():
+    rig = Rig(Plant(2.0, 1))
+    rig.land()
+    rig.supervisor.step(rig.t, 5.0, 5.9, 5.0)
+    assert not rig.supervisor.failure
+    rig.supervisor.step(rig.t, 5.0, 6.1, 5.0)
+    assert rig.supervisor.urgent
+    assert "wall" in rig.supervisor.failure
+
+
+def test_chosen_gains_that_the_contact_would_make_swing_are_refused_at_the_landing():
+    gains = ForceGains(PERIOD * 0.1, 0.1, 0.0, np.inf, PERIOD)
+    rig = Rig(Plant(5.0, 2), gains=gains).land()
+    assert "unstable on a contact of" in rig.supervisor.failure
+    assert not rig.supervisor.urgent
+
+
+@pytest.mark.parametrize(("factor", "stops"), [(1.7, False), (5.0, True)])
+def test_a_force_that_swings_has_the_gains_softened_once_and_then_stops(factor, stops):
+    """On the way the surface becomes stiffer than what the landing has measured."""
+    rig = Rig(Plant(4.0, 2, surface=lambda t: 0.0))
+    rig.land().draw(1.0)
+    plant = rig.plant
+    plant.stiffness *= factor
+    height = plant.height + plant.force / plant.stiffness
+    plant.surface = lambda t: height
+    rig.draw(12.0)
+    states = [event.state for event in rig.supervisor.events]
+    assert ("oscillating" in states) or rig.supervisor.urgent
+    assert bool(rig.supervisor.failure) == stops
+    assert rig.peak < 20.0
+    if not stops:
+        assert states.count("oscillating") == 1
+        assert np.ptp([row[3] for row in rig.rows[-150:]]) < 1.0
+
+
+def test_the_clamp_counts_where_the_surface_is_and_not_the_tools_compression():
+    """A spring of 0.5 N/mm stands 10 mm deep in itself: that is no displacement of the surface."""
+    rig = Rig(Plant(0.5, 0, surface=lambda t: -2.0), clamp=4.0, reach=4.0)
+    pairs = rig.land().draw(4.0)
+    assert abs(pairs[-50:, 0].mean() - 5.0) < 0.1
+    assert rig.supervisor.e == pytest.approx(-12.0, abs=0.3)
+
+
+def test_saturation_is_told_as_it_happens():
+    rig, _ = changing(2.0, lambda t: -max(t - 1.0, 0.0) * 1.0, clamp=4.0, reach=3.0)
+    said = [event.detail for event in rig.supervisor.events]
+    assert any("saturated" in words and "coupling_clamp" in words for words in said)
+
+
+def test_a_lifted_part_is_a_retreat_and_a_landing_and_no_loss():
+    begun = []
+
+    def height(t):
+        """The plan lifts the tool by 5 mm: seen from it the surface falls away."""
+        if rig.supervisor.settled and not begun:
+            begun.append(t)
+        past = t - begun[0] if begun else 0.0
+        return 0.3 - (5.0 if 2.0 < past < 4.0 else 0.0)
+
+    rig = Rig(Plant(2.0, 1, surface=height))
+    rig.land()
+    start = rig.t
+    rig.draw(8.0, lambda t: 0.0 if 1.9 < t - start < 4.1 else 5.0)
+    states = rig.states
+    assert "lost" not in states
+    assert "retreating" in states
+    assert states[-1] == "drawing"
+    assert abs(np.mean([row[3] for row in rig.rows[-100:]]) - 5.0) < 0.1
+    assert rig.peak < 7.5
+
+
+def test_a_stroke_that_begins_lifted_only_takes_its_zero():
+    rig = Rig(Plant(2.0, bias=0.8, surface=lambda t: -30.0))
+    rig.supervisor.begin(airborne=True)
+    while not rig.supervisor.settled:
+        rig.cycle(0.0)
+    assert rig.t < 2.0
+    rig.cycle(0.0)
+    assert rig.zero == pytest.approx(0.8, abs=0.05)
+    assert np.all([row[2] == 0.0 for row in rig.rows])
+
+
+def test_after_the_stroke_it_comes_clear_of_the_work():
+    rig = Rig(Plant(2.0, 1, surface=lambda t: 2.0))
+    rig.land()
+    rig.draw(1.0)
+    e = rig.supervisor.e
+    while not rig.supervisor.retreated:
+        rig.plant.step(rig.supervisor.retreat(rig.t))
+    assert rig.supervisor.e > e + 6.0
+    for _ in range(20):
+        rig.plant.step(rig.supervisor.e)
+    assert rig.plant.force == 0.0
+
+
+def test_a_second_landing_on_what_is_known_is_quicker():
+    rig = Rig(Plant(2.0, 0))
+    rig.land()
+    first = rig.t
+    rig.supervisor.begin()
+    rig.supervisor.lifted(6.0)
+    begun = rig.t
+    while not rig.supervisor.settled:
+        rig.cycle()
+    assert rig.t - begun < 0.75 * first

@@ -1,0 +1,182 @@
+"""The live view: a person sees a run, the loop does not know, and nothing is drawn elsewhere."""
+
+import contextlib
+import os
+import pty
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dmpcli import live_view
+from dmpcli.control import watching
+from dmpcli.control.run_log import Row, RunLog
+from dmpcli.live_view import SIZE, SharedSnapshot
+from tests.commands.test_execute import columns, written
+
+DMPCLI = str(Path(sys.executable).with_name("dmpcli"))
+
+
+def drawn(content):
+    """What a picture says, as text."""
+    from rich.console import Console
+
+    console = Console(width=100, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    with contextlib.closing(console.file):
+        console.print(live_view.table(content))
+        return console.export_text()
+
+
+def logged(count, late=0.0004, **more):
+    log = RunLog(sensed=True, coupled=True)
+    for k in range(count):
+        pose = (np.array([1.0 * k, 2.0, 3.0]), np.eye(3))
+        wrench = np.array([1.0, 2.0, 2.0, 0.1, 0.0, 0.0])
+        log.add(
+            0.02 * k,
+            Row(
+                0.02 * k, 0.02 * k, pose, pose, pose, 0.02 * k, late, wrench, 0.25, "ready",
+                "stroke", "a", **more,
+            ),
+        )  # fmt: skip
+    return log
+
+
+def test_a_view_says_pose_force_lateness_contact_and_share():
+    log = logged(11)
+    view = watching.RunView("executing", log.rows, 0.02, lambda t: t / 0.4)
+    seen = view.now()
+    assert seen["pose"][:3] == [10.0, 2.0, 3.0]
+    assert seen["force"] == [1.0, 2.0, 2.0]
+    assert seen["share"] == pytest.approx(0.5)
+    assert (seen["late"], seen["worst"]) == pytest.approx((0.4, 0.4))
+    text = drawn(seen | {"reason": "done"})
+    for words in ("executing", "50 %", "10.00", "|F| 3.00 N", "led by 0.25 mm", "stroke", "done"):
+        assert words in text, words
+
+
+def test_the_worst_lateness_is_that_of_all_rows_since_the_view_began():
+    log = logged(5, late=0.003)
+    view = watching.RunView("executing", log.rows, 0.02)
+    assert view.now()["worst"] == pytest.approx(3.0)
+    for k in range(5, 9):
+        pose = (np.zeros(3), np.eye(3))
+        log.add(0.02 * k, Row(0.02 * k, 0, pose, pose, pose, 0, 1e-4, np.zeros(6), 0, "ready", "x"))
+    seen = view.now()
+    assert (seen["late"], seen["worst"]) == pytest.approx((0.1, 3.0))
+
+
+def test_there_is_nothing_to_see_before_the_first_row():
+    assert watching.RunView("executing", RunLog().rows, 0.02).now() is None
+
+
+def test_a_snapshot_is_read_whole_or_not_at_all():
+    with tempfile.TemporaryFile() as file:
+        file.truncate(SIZE)
+        ours, theirs = SharedSnapshot(file.fileno()), SharedSnapshot(file.fileno())
+        assert theirs.read() is None
+        texts = ["a" * 3000, "b" * 3000]
+        over = threading.Event()
+
+        def write():
+            while not over.is_set():
+                for text in texts:
+                    ours.write({"text": text})
+
+        thread = threading.Thread(target=write)
+        thread.start()
+        found = []
+        while len(found) < 200:
+            seen = theirs.read()
+            if seen is not None:
+                found.append(seen["text"])
+        over.set()
+        thread.join()
+        assert set(found) <= set(texts)
+        ours.write({"text": "c" * 2 * SIZE})  # what does not fit is left out
+        assert theirs.read()["text"] in texts
+        ours.close()
+        theirs.close()
+
+
+def watched(tmp_path, *words, interrupt=None):
+    """Run a command whose standard error is a terminal; return what was drawn, and its end."""
+    screen, side = pty.openpty()
+    process = subprocess.Popen(
+        [DMPCLI, *map(str, words)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=side,
+        cwd=tmp_path,
+        env=os.environ | {"TERM": "xterm", "COLUMNS": "100"},
+    )
+    os.close(side)
+    text = b""
+    until = time.monotonic() + 60.0
+    with contextlib.suppress(OSError):  # the other end has closed
+        while time.monotonic() < until:
+            more = os.read(screen, 65536)
+            if not more:
+                break
+            text += more
+            if interrupt is not None and interrupt in text:
+                process.send_signal(signal.SIGINT)
+                interrupt = None
+    os.close(screen)
+    process.communicate(timeout=30)
+    return text.decode(errors="replace"), process.returncode
+
+
+@pytest.mark.slow
+def test_a_person_at_the_terminal_sees_the_run_and_every_message(tmp_path):
+    written(tmp_path / "traj.parquet", columns(duration=2.0))
+    words = ["execute", "traj.parquet", "-o", "run.parquet", "--realtime"]
+    # Another test may keep this computer busy.
+    words += ["--robot", "mock:?lag=0.4", "--following-error", "200"]
+    text, code = watched(tmp_path, *words)
+    assert code == 0, text
+    for said in ("streaming; Ctrl-C decelerates", "executing", "worst so far", "ended", "done"):
+        assert said in text, said
+    quiet, code = watched(tmp_path, *words, "--force", "-q")
+    assert code == 0
+    assert "executing" not in quiet
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_run_and_the_view_with_it(tmp_path):
+    written(tmp_path / "traj.parquet", columns(duration=8.0))
+    words = ["execute", "traj.parquet", "-o", "run.parquet", "--realtime"]
+    words += ["--robot", "mock:?lag=0.4", "--following-error", "200"]
+    text, code = watched(tmp_path, *words, interrupt=b"executing")
+    assert code == 130, text
+    assert "SIGINT" in text
+    assert "Traceback" not in text
+
+
+def test_into_a_pipe_nothing_is_drawn(tmp_path):
+    written(tmp_path / "traj.parquet", columns(duration=2.0))
+    done = subprocess.run(
+        [DMPCLI, "execute", "traj.parquet", "-o", "run.parquet", "--realtime", "--robot",
+         "mock:?lag=0.4", "--following-error", "200"],
+        cwd=tmp_path, capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert b"executing" not in done.stderr
+    assert b"\x1b" not in done.stderr
+
+
+def test_a_view_that_cannot_be_had_costs_nothing(monkeypatch):
+    monkeypatch.setattr(watching, "watched", lambda: True)
+
+    def fail(*_, **__):
+        raise OSError("no processes left")
+
+    monkeypatch.setattr(watching.subprocess, "Popen", fail)
+    with watching.live(lambda: None, True) as ended:
+        ended("done")

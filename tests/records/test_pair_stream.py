@@ -1,0 +1,109 @@
+"""A table that is read in pieces says what it says when it is read whole."""
+
+import io
+from itertools import chain
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmpcli.errors import InputError
+from dmpcli.records import file_io, pair_stream, pairs
+
+HEADER = "id,x0,y0,z0,xg,yg,zg,surface,colour"
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    monkeypatch.setattr(pair_stream, "STREAMED", 0)
+    monkeypatch.setattr(pair_stream, "STREAMED_ROWS", 0)
+    monkeypatch.setattr(pair_stream, "_BLOCK", 37)
+
+
+def lines_of(count):
+    return [f"k{i},{i},2,3,4,{i}.5,6,part{i % 3}.stl,red" for i in range(count)]
+
+
+def write(path, lines, end="\n"):
+    path.write_bytes((end.join([HEADER, *lines]) + end).encode())
+    return path
+
+
+def joined(path, rows):
+    stream = pair_stream.opened(path)
+    assert stream.sha256 == file_io.read(path).sha256
+    stream.check_ids(rows)
+    return list(stream.pieces(rows))
+
+
+def same(path, rows):
+    whole, pieces = pairs.read(file_io.read(path)), joined(path, rows)
+    assert [len(one) for one in pieces[:-1]] == [rows] * (len(pieces) - 1)
+    assert list(chain(*(one.ids for one in pieces))) == whole.ids
+    assert list(chain(*(one.status for one in pieces))) == whole.status
+    start = np.concatenate([one.pairs.start for one in pieces])
+    np.testing.assert_array_equal(start, whole.pairs.start)
+    row = 0
+    for one in pieces:
+        assert one.unknown == whole.unknown
+        for i in range(len(one)):
+            assert one.place(i) == whole.place(row)
+            mine = one.places.places[one.places.of[i]]
+            assert mine == whole.places.places[whole.places.of[row]]
+            row += 1
+
+
+@settings(deadline=None, max_examples=25)
+@given(count=st.integers(1, 12), rows=st.integers(1, 5), data=st.data())
+def test_pieces_are_the_table_whatever_stands_between_its_rows(tmp_path_factory, count, rows, data):
+    lines = lines_of(count)
+    for _ in range(data.draw(st.integers(0, 6))):
+        odd = data.draw(st.sampled_from(["", "# a comment", "   ", "k,1,nan,3,4,5,6,,"]))
+        at = data.draw(st.integers(0, len(lines)))
+        lines.insert(at, odd.replace("k,", f"odd{len(lines)},"))
+    end = data.draw(st.sampled_from(["\n", "\r\n"]))
+    same(write(tmp_path_factory.mktemp("t") / "p.csv", lines, end), rows)
+
+
+def test_parquet_tables_likewise(tmp_path):
+    table = pa.csv.read_csv(io.BytesIO("\n".join([HEADER, *lines_of(11)]).encode()))
+    pq.write_table(table, tmp_path / "p.parquet", row_group_size=4)
+    for rows in (1, 3, 5, 11, 20):
+        same(tmp_path / "p.parquet", rows)
+
+
+def test_rows_without_ids_are_numbered_through(tmp_path):
+    lines = [line.partition(",")[2] for line in lines_of(5)]
+    (tmp_path / "p.csv").write_text("\n".join([HEADER.partition(",")[2], *lines]) + "\n")
+    ids = chain(*(one.ids for one in joined(tmp_path / "p.csv", 2)))
+    assert list(ids) == list("12345")
+
+
+def test_two_rows_of_one_id_are_told_wherever_they_stand(tmp_path):
+    lines = lines_of(9)
+    lines[7] = lines[7].replace("k7", "k1")
+    with pytest.raises(InputError, match=r"'id', line 9: 'k1' is also in line 3; ids must differ"):
+        joined(write(tmp_path / "p.csv", lines), 3)
+
+
+def test_a_line_of_another_length_is_told_by_its_number_in_the_file(tmp_path):
+    lines = lines_of(9)
+    lines[6] += ",1"
+    with pytest.raises(InputError, match="line 8 has 10 columns"):
+        joined(write(tmp_path / "p.csv", lines), 2)
+
+
+def test_quoted_cells_and_old_line_ends_are_read_whole(tmp_path):
+    quoted = lines_of(3)
+    quoted[1] = quoted[1].replace("red", '"red\nor blue"')
+    assert pair_stream.opened(write(tmp_path / "q.csv", quoted)) is None
+    assert pair_stream.opened(write(tmp_path / "r.csv", lines_of(3), "\r")) is None
+
+
+def test_short_tables_are_read_whole(tmp_path, monkeypatch):
+    monkeypatch.setattr(pair_stream, "STREAMED", 1000)
+    assert pair_stream.opened(write(tmp_path / "p.csv", lines_of(3))) is None
