@@ -132,7 +132,9 @@ def title(axes: Axes, text: str) -> None:
 
 def labels(axes: Axes, x: str = "", y: str = "") -> None:
     """Write what the axes of a panel are, at places of our own for the same reason."""
-    width, height = axes.get_position().size * axes.figure.get_size_inches()
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width, height = axes.get_position().size * figure.get_size_inches()
     if x:
         axes.set_xlabel(x)
         axes.xaxis.set_label_coords(0.5, -0.26 / height)
