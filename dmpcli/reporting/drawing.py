@@ -140,7 +140,7 @@ def labels(axes: Axes, x: str = "", y: str = "") -> None:
         axes.xaxis.set_label_coords(0.5, -0.26 / height)
     if y:
         axes.set_ylabel(y)
-        axes.yaxis.set_label_coords(-0.56 / width, 0.5)
+        axes.yaxis.set_label_coords(-0.66 / width, 0.5)
 
 
 def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle) -> None:
@@ -180,7 +180,7 @@ def shares(count: int) -> list[float]:
     return [0.12 + 0.76 * (k + 0.5) / count for k in range(count)]
 
 
-def heading(axes: Axes, x: Floats, y: Floats, style: PlotStyle, share: float = 0.5) -> None:
+def heading(axes: Axes, x: Floats, y: Floats, style: PlotStyle, share: float = 0.9) -> None:
     """Draw an arrowhead that says which way a curve runs."""
     # By the way along it: samples lie close together where the tool is slow.
     way = np.append(0.0, np.hypot(np.diff(x), np.diff(y)).cumsum())

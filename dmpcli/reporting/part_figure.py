@@ -20,7 +20,7 @@ from dmpcli.reporting.surface_picture import sheet
 from dmpcli.spatial.vectors import unit
 
 _WIDTH, _PANEL, _TALLEST = 5.9, 1.2, 4.4
-_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.85, 0.2, 0.42, 0.3, 0.48
+_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.42, 0.3, 0.48
 _INSET = 1.25
 
 PIXELS = 170.0

@@ -23,7 +23,7 @@ FEW = 0.9
 """Where less than this share of the samples has a like it is said."""
 
 _WIDTH, _PANEL = 5.9, 1.3
-_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.75, 0.2, 0.42, 0.3, 0.55
+_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.42, 0.3, 0.55
 _AS_IS, _ALIGNED = "#0072B2", "#D55E00"
 
 

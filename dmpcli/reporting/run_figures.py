@@ -10,7 +10,7 @@ from dmpcli.records.record import Record
 from dmpcli.reporting import contact, drawing, tracking
 
 _WIDTH, _PANEL = 5.9, 1.4
-_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.75, 0.2, 0.62, 0.3, 0.55
+_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.62, 0.3, 0.55
 _FORCE, _ASIDE, _REST, _LINE = "#0072B2", "#D55E00", "#AAAAAA", "#444444"
 _LEAST_FORCE = 1.0
 

@@ -12,7 +12,7 @@ from dmpcli.reporting.drawing import PlottedCurve
 from dmpcli.reporting.time_curves import swing_axis
 
 _WIDTH, _HEIGHT = 5.9, 1.25
-_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.85, 0.2, 0.36, 0.3, 0.48
+_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.36, 0.3, 0.48
 _LEAST_TURN = 1.0
 
 
