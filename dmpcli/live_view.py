@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-EVERY = 0.2
+EVERY = 0.5
 """s between two pictures."""
 
 SIZE = 4096
