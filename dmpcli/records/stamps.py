@@ -43,8 +43,9 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
         A value is no time; names the row.
     """
     if nanoseconds is not None:
-        t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
-        return t - t[0]
+        both = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
+        since: Floats = both - both[0]
+        return since
     values: Any = table.columns.get(column)
     if isinstance(values, pa.Array | pa.ChunkedArray):
         dates = _dates(values)
