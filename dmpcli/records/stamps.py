@@ -60,6 +60,24 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
     return t
 
 
+def clock(table: Table, column: str, unit: str, first: float) -> float | None:
+    """Return what a column of times showed when `seconds` has 0, s; None of dates.
+
+    Parameters
+    ----------
+    table : Table
+    column : str
+    unit : str
+        Of numbers.
+    first : float
+        What `seconds` has in the first row, s.
+    """
+    values: Any = table.columns.get(column)
+    if isinstance(values, pa.Array | pa.ChunkedArray) and _dates(values) is not None:
+        return None
+    return float(table.numbers(column)[0]) * TIME[unit] - first
+
+
 def _dates(values: Any) -> Floats | None:
     """Seconds since the first of dates; None where the column holds something else."""
     try:
