@@ -195,10 +195,12 @@ class _Running:
         out.close()
 
     def deaf(self) -> bool:
-        if time.monotonic() - max(self.shared[_BEGIN], self.begun) > STILL:
+        if self.shared[_BEGIN] == 0.0:  # it still loads what it needs
+            return time.monotonic() - self.begun > 10.0 * STILL
+        if time.monotonic() - self.shared[_BEGIN] > STILL:
             return True
         assert self.process is not None
-        return self.shared[_BEGIN] > 0.0 and _used(self.process) - self.shared[_USED] > DEAF
+        return _used(self.process) - self.shared[_USED] > DEAF
 
     def drain(self) -> None:
         try:
