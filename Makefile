@@ -16,6 +16,7 @@
 #   make bench       the timings that the README quotes
 #   make peers       the same beside other packages, in an environment of their own
 #   make judges      the tests that programs of others judge, which make test does without
+#   make pages       a report's pages in a headless browser: photographs in out/pages
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
@@ -46,7 +47,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .PHONY: help setup docs reference demo reproduce reproduce-force test test-quick coverage test-lowest lint lock dist bench peers \
-    judges faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
+    judges pages faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -134,6 +135,7 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python -m benchmarks.csv_reading
+	$(BIN)/python -m benchmarks.mcap_import
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
 	$(BIN)/python -m benchmarks.taught_surfaces
@@ -151,7 +153,30 @@ judges:
 	$(JUDGES)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/judges.txt
 	@sh tools/linuxcnc.sh $(OUT)/judges/linuxcnc
 	DMPCLI_JUDGES=required DMPCLI_LINUXCNC=$(OUT)/judges/linuxcnc $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
-	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py
+	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py \
+	    tests/metrics/test_pose_error.py tests/commands/test_report_pose_error.py
+
+# What people look at, looked at in headless Chromium (Debian: apt-get install chromium) at the widths
+# of a phone and of a desk: nothing asked of the network, no error told, nothing wider than its window.
+
+PAGES := $(OUT)/pages
+
+pages: $(VENV)/installed
+	@mkdir -p $(PAGES)
+	$(DMPCLI) record -o $(PAGES)/demonstration.parquet --seed 1 -q
+	$(DMPCLI) fit $(PAGES)/demonstration.parquet -o $(PAGES)/skill.json -q
+	$(DMPCLI) generalize $(PAGES)/skill.json -o $(PAGES)/trajectory.parquet \
+	    --start -701.698 132.420 -17.538 --goal -807.597 129.739 -17.518 --ease-in 0.5 --ease-out 0.5 -q
+	$(DMPCLI) execute $(PAGES)/trajectory.parquet -o $(PAGES)/run.parquet --coupling force -q
+	$(DMPCLI) generalize $(PAGES)/skill.json -o $(PAGES)/curved.parquet $(PAIR_CURVED) \
+	    --surface $(BENCH) --orientation surface -q
+	$(DMPCLI) generalize $(PAGES)/skill.json -o $(PAGES)/batch --pairs sample_runs/pairs.csv -q
+	$(DMPCLI) report $(PAGES)/demonstration.parquet $(PAGES)/skill.json $(PAGES)/trajectory.parquet \
+	    $(PAGES)/run.parquet -o $(PAGES)/run --view -q > $(PAGES)/run.txt
+	$(DMPCLI) report $(PAGES)/demonstration.parquet $(PAGES)/curved.parquet --surface $(BENCH) \
+	    -o $(PAGES)/curved --view -q > $(PAGES)/curved.txt
+	$(DMPCLI) report $(PAGES)/demonstration.parquet $(PAGES)/batch -o $(PAGES)/many --view -q > $(PAGES)/many.txt
+	$(BIN)/python tools/pages.py $(PAGES) $(foreach p,run curved many,$(PAGES)/$(p)/report.html $(PAGES)/$(p)/view.html)
 
 # One seed replays one failure: python -m tests.faults --seed N.
 SEEDS ?= 10000
@@ -268,10 +293,10 @@ $(foreach stroke,$(STROKES),$(foreach skill,$(CURVED),$(eval $(call CURVED_RULE,
 define REPORT_RULE
 $(R)/$(1)/report/report.json $(R)/$(1)/tables.txt &: sample_runs/$(1).parquet \
     $(foreach t,1 2,$(SKILLS:%=$(R)/$(1)/%-table$(t).parquet))
-	$(DMPCLI) report $$^ -o $(R)/$(1)/report > $(R)/$(1)/tables.txt
+	$(DMPCLI) report $$^ --paper -o $(R)/$(1)/report > $(R)/$(1)/tables.txt
 $(R)/$(1)/curved/report.json $(R)/$(1)/curved.txt &: sample_runs/$(1).parquet \
     $(CURVED:%=$(R)/$(1)/%-fig9.parquet)
-	$(DMPCLI) report $$^ --surface $(BENCH) -o $(R)/$(1)/curved > $(R)/$(1)/curved.txt
+	$(DMPCLI) report $$^ --paper --surface $(BENCH) -o $(R)/$(1)/curved > $(R)/$(1)/curved.txt
 endef
 $(foreach stroke,$(STROKES),$(eval $(call REPORT_RULE,$(stroke))))
 
@@ -280,17 +305,17 @@ $(R)/drag/builtin.parquet: sample_runs/recorded.toml | $(VENV)/installed
 	$(DMPCLI) record -o $@ --config $< --drag builtin --seed 1
 $(R)/drag/report/report.json $(R)/drag/tables.txt &: sample_runs/recorded.parquet \
     $(R)/drag/builtin.parquet
-	$(DMPCLI) report $^ -o $(R)/drag/report > $(R)/drag/tables.txt
+	$(DMPCLI) report $^ --paper -o $(R)/drag/report > $(R)/drag/tables.txt
 
 # The README's pictures.
 
 pictures: reproduce
 	@mkdir -p docs/images
 	$(DMPCLI) generalize $(R)/reference/modified.json -o $(R)/star --pairs sample_runs/pairs.csv
-	$(DMPCLI) report sample_runs/reference.parquet $(R)/star -o $(R)/star-report -q > $(R)/star.txt
+	$(DMPCLI) report sample_runs/reference.parquet $(R)/star --paper -o $(R)/star-report -q > $(R)/star.txt
 	cp $(R)/star-report/fig8_generalization_plane.png docs/images/one_stroke_many_places.png
 	$(DMPCLI) report sample_runs/reference.parquet $(R)/reference/paper-table2.parquet \
-	    $(R)/reference/distance-table2.parquet -o $(R)/table2-report -q > $(R)/table2.txt
+	    $(R)/reference/distance-table2.parquet --paper -o $(R)/table2-report -q > $(R)/table2.txt
 	cp $(R)/table2-report/fig8_generalization_plane.png docs/images/table2.png
 	cp $(R)/reference/curved/fig9_surface.png docs/images/fig9.png
 	cp $(R)/drag/report/fig4_drag_plane.png docs/images/drag.png

@@ -76,7 +76,8 @@ BENCH = Extra(
     ("mujoco",),
     "`bench://` and `simulate --physics mujoco`, contact with physics",
 )
-EXTRAS = (UR, DASK, SVG, ROS, BENCH)
+VIEW = Extra("view", ("k3d",), "`report --view`, a part that can be turned")
+EXTRAS = (UR, DASK, SVG, ROS, BENCH, VIEW)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",

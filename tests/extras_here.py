@@ -13,6 +13,7 @@ MODULES = {
     "svg": "svgelements",
     "ros": "rosbags",
     "bench": "mujoco",
+    "view": "k3d",
 }
 
 

@@ -25,9 +25,10 @@ PIPELINE = (
     "inspect skill.json",
 )
 MADE = ("demo.parquet", "skill.json", "paper.json", "traj.parquet", "run.parquet")
-FIGURES = ("report/report.json", "report/fig8_generalization_plane.svg")
+FIGURES = ("report/report.json", "report/report.html", "report/plane.svg")
 LACKING = {
     "ur": "execute traj.parquet -o none.parquet --robot ur://127.0.0.1",
+    "view": "report demo.parquet -o none --view",
     "dask": "generalize skill.json -o none --pairs {pairs} --cluster tcp://127.0.0.1:1",
 }
 """What each extra is for, by its name: exit code 2, and the line that installs it."""

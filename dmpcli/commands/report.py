@@ -43,9 +43,25 @@ def command(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="DIR", help="Also write report.json, CSV and figures here."
+            "-o",
+            "--output",
+            metavar="DIR",
+            help="Also write report.html, report.json, CSV and figures here.",
         ),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="With -o: write view.html too, a part to be turned.")
+    ] = False,
+    show: Annotated[
+        bool, typer.Option("--open", help="With -o: show the page, or with --view the part.")
+    ] = False,
+    png: Annotated[
+        bool, typer.Option("--png", help="With -o: write the figures as PNG too, beside the SVG.")
+    ] = False,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="The paper's tables beside ours, and with -o its figures."),
+    ] = False,
     form: RecordingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
@@ -64,6 +80,12 @@ def command(
     if surface_cache is not None and pairs is None:
         raise InputError("--surface-cache: belongs to --pairs; leave it out")
     check_output(output)
+    if output is None and (view or show):
+        raise InputError("--view and --open need the folder of the pages: give -o DIR")
+    if view:
+        from dmpcli.reporting.turnable import check
+
+        check()
     layout = form.as_layout()
     read = grounds = None
     if pairs is not None:
@@ -75,8 +97,10 @@ def command(
         grounds = SiteGrounds(pairs, otherwise, surface_cache)
     elif surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output, grounds)
+    made = report(files, None, layout, read, output, grounds, paper, view, png)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
+    if show and output is not None:
+        typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))
 
 
 def _width() -> int:

@@ -4,7 +4,7 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from dmpcli.records import cylinder, manifest, plane, pose, skill, sphere, tool
+from dmpcli.records import cylinder, manifest, plane, pose, report_document, skill, sphere, tool
 
 SCHEMAS = {
     "skill": skill.schema,
@@ -14,6 +14,7 @@ SCHEMAS = {
     "tool": tool.schema,
     "pose": pose.schema,
     "manifest": manifest.schema,
+    "report": report_document.schema,
 }
 
 

@@ -70,6 +70,8 @@ class Recording:
         What is likely wrong with it, with the remedy.
     ours : bool
         Whether it is a file of this program's, which tells its units and angles.
+    began : float or None
+        What the file's clock shows at time 0, s; None where it shows dates, or there is none.
     wrench : array, shape (T, 6), or None
         On the tool, at the TCP, base axes, N and N·m, where it was asked for and is there.
     """
@@ -78,6 +80,7 @@ class Recording:
     told: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     ours: bool = False
+    began: float | None = None
     wrench: Floats | None = None
 
 
@@ -154,7 +157,8 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
         stroke = Trajectory(ours.t, ours.position(), ours.rotation())
         _check_time(Table(source.name, ours.columns), stroke.t, "t")
         _check_position(Table(source.name, ours.columns), stroke.position)
-        return Recording(stroke, ours=True, wrench=_own_wrench(ours) if wrench else None)
+        felt = _own_wrench(ours) if wrench else None
+        return Recording(stroke, ours=True, began=0.0, wrench=felt)
     if source.content.lstrip()[:1] == b"{":
         raise InputError(f"{source.name}: is JSON, not a recording; a recording is CSV or Parquet")
     given = layout or Layout()
@@ -175,7 +179,9 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
     if felt is not None and len(felt) != len(stroke.t):
         felt = None
         reading.told.append("the wrench is left out: rows with one stamp were made one")
-    return Recording(stroke, tuple(reading.told), tuple(reading.doubts), wrench=felt)
+    began = _began(reading, name, float(t[0]))
+    told, doubts = tuple(reading.told), tuple(reading.doubts)
+    return Recording(stroke, told, doubts, began=began, wrench=felt)
 
 
 def stroke(source: Source, layout: Layout | None = None) -> Trajectory:
@@ -295,6 +301,18 @@ def _time(reading: _Reading) -> tuple[Floats, str]:
         return _ros_time(reading, column), column.name
     unit = reading.unit(column, "time", TIME)
     return stamps.seconds(table, column.name, unit, within.name if within else None), column.name
+
+
+def _began(reading: _Reading, name: str, first: float) -> float | None:
+    """Return what the clock of a table showed at time 0, s; None without one of numbers."""
+    column = reading.find("t")
+    if reading.layout.sample_rate is not None or column is None:
+        return None
+    began = stamps.clock(reading.table, name, reading.units["time"], first)
+    within = reading.find(NANOSECONDS)
+    if began is None or within is None:
+        return began
+    return began + float(reading.table.numbers(within.name)[0]) * 1e-9
 
 
 def _ros_time(reading: _Reading, column: LayoutColumn) -> Floats:

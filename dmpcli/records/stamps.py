@@ -44,8 +44,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
     """
     if nanoseconds is not None:
         t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
-        t -= t[0]
-        return t
+        return t - t[0]
     values: Any = table.columns.get(column)
     if isinstance(values, pa.Array | pa.ChunkedArray):
         dates = _dates(values)
@@ -56,8 +55,26 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
             return exact
     t = table.numbers(column) * TIME[unit]
     if len(t) and abs(t[0]) > EPOCH:
-        t -= t[0]
+        t = t - t[0]
     return t
+
+
+def clock(table: Table, column: str, unit: str, first: float) -> float | None:
+    """Return what a column of times showed when `seconds` has 0, s; None of dates.
+
+    Parameters
+    ----------
+    table : Table
+    column : str
+    unit : str
+        Of numbers.
+    first : float
+        What `seconds` has in the first row, s.
+    """
+    values: Any = table.columns.get(column)
+    if isinstance(values, pa.Array | pa.ChunkedArray) and _dates(values) is not None:
+        return None
+    return float(table.numbers(column)[0]) * TIME[unit] - first
 
 
 def _dates(values: Any) -> Floats | None:

@@ -193,7 +193,9 @@ def _known(values: Floats) -> Floats:
     return values[np.isfinite(values)]
 
 
-def histogram(values: Floats, low: float | None = None, high: float | None = None) -> Row | None:
+def histogram(
+    values: Floats, low: float | None = None, high: float | None = None, bins: int = BINS
+) -> Row | None:
     """Counts of values (k,) in bins of equal width, over their own range; None without values."""
     if not len(values):
         return None
@@ -205,7 +207,7 @@ def histogram(values: Floats, low: float | None = None, high: float | None = Non
         # Distances are not negative, nor are the bins that they fall into.
         low = middle - 0.5 * least if low < 0.0 else max(0.0, middle - 0.5 * least)
         high = low + least
-    counts, edges = np.histogram(values, BINS, (low, high))
+    counts, edges = np.histogram(values, bins, (low, high))
     return {"edges": edges.tolist(), "counts": counts.tolist()}
 
 

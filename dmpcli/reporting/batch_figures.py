@@ -1,7 +1,5 @@
 """Figures of a batch: how its measures are distributed, and its worst strokes."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,7 +7,7 @@ from matplotlib.lines import Line2D
 
 from dmpcli.arrays import Floats
 from dmpcli.reporting import drawing
-from dmpcli.reporting.batch import MeasuredBatch, histogram
+from dmpcli.reporting.batch import ALIKE, BINS, MeasuredBatch, histogram
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.style import STYLES
 
@@ -32,31 +30,6 @@ _ONE = {"wave_height": "wave", "nearest_max": "deviation", "surface_distance_max
 _WIDTH, _HEIGHT, _ACROSS, _UP = 2.6, 1.35, 0.75, 0.6
 _TOP, _RIGHT = 0.3, 0.2
 _CELL, _CELL_GAP = 1.85, 0.45
-
-
-def batch_figures(many: Sequence[MeasuredBatch]) -> dict[str, bytes]:
-    """Draw the figures of batches.
-
-    Parameters
-    ----------
-    many : sequence of MeasuredBatch
-
-    Returns
-    -------
-    dict of bytes
-        File names (SVG and PNG) and contents: ``batch_distribution`` and ``batch_worst`` of the
-        first batch, with ``_2`` and so on of the others.
-    """
-    files = {}
-    with drawing.settings():
-        for number, one in enumerate(many, start=1):
-            more = f"_{number}" if number > 1 else ""
-            figures = {"batch_distribution": distributions(one), "batch_worst": worst(one)}
-            for name, figure in figures.items():
-                if figure is not None:
-                    for suffix, content in drawing.saved(figure).items():
-                        files[f"{name}{more}.{suffix}"] = content
-    return files
 
 
 def distributions(many: MeasuredBatch) -> Figure | None:
@@ -90,10 +63,35 @@ def distributions(many: MeasuredBatch) -> Figure | None:
     return figure
 
 
+def _alike(axes: Axes, values: Floats) -> None:
+    """Say that all strokes have the same value: what they differ by is rounding."""
+    value = float(np.median(values))
+    axes.bar([0.0], [len(values)], width=0.2, color=STYLES["modified"].color)
+    axes.set_xlim(-1.0, 1.0)
+    told = f"{value:.3f}" if abs(value) >= 5e-4 else "0.000"
+    axes.set_xticks([0.0], [f"all {told}"])
+
+
+def bins_of(values: Floats) -> int:
+    """How many bins values (k,) call for: few of few, and none that is narrower than they scatter.
+
+    The rule is Freedman and Diaconis' (1981); where a quarter of the values are one, Sturges'.
+    """
+    few = int(np.ceil(np.log2(len(values)))) + 1
+    low, high = np.quantile(values, [0.25, 0.75])
+    width = 2.0 * float(high - low) / len(values) ** (1.0 / 3.0)
+    if width <= 0.0:
+        return min(few, BINS)
+    return int(np.clip(np.ceil(float(np.ptp(values)) / width), few, BINS))
+
+
 def _bars(axes: Axes, values: Floats, target: float | None) -> None:
     """Draw a histogram of values (k,), and where the demonstration stands."""
     shown = values if target is None else np.append(values, target)
-    counted = histogram(values, float(shown.min()), float(shown.max()))
+    if float(np.ptp(values)) <= ALIKE * max(1.0, float(np.abs(values).max())):
+        _alike(axes, values)
+        return
+    counted = histogram(values, float(shown.min()), float(shown.max()), bins_of(values))
     assert counted is not None
     low, high = np.quantile(values, [0.05, 0.95])
     axes.axvspan(low, high, color="#F4E3C3", lw=0, zorder=0)

@@ -15,7 +15,8 @@ from dmpcli.reporting.stroke_measures import Row
 THRESHOLD = 0.5
 """N; less is no contact where a run's file does not say what is."""
 
-_FORCE = ("fx", "fy", "fz")
+FORCE = ("fx", "fy", "fz")
+"""Columns of the force on the tool, N, base axes."""
 
 
 def contact_of(run: Record) -> Row | None:
@@ -31,14 +32,22 @@ def contact_of(run: Record) -> Row | None:
     said = run.provenance.facts.get("contact")
     if isinstance(said, dict):
         return dict(said)
-    if not run.has(*_FORCE):
+    force = force_along_normal(run)
+    if force is None:
         return None
-    normal = _normals(run)
-    if normal is None:
-        return None
-    force = np.sum(run.stack(_FORCE) * normal, axis=1)
     drawn = force[(run.columns["phase"] == "stroke") & np.isfinite(force)]
     return asdict(contact(drawn, THRESHOLD)) if len(drawn) else None
+
+
+def force_along_normal(run: Record) -> Floats | None:
+    """Return the force along the normal at each row of a run, shape (n,), N; None if none was felt.
+
+    Pressing is positive.
+    """
+    if not run.has(*FORCE):
+        return None
+    normal = _normals(run)
+    return None if normal is None else np.asarray(np.sum(run.stack(FORCE) * normal, axis=1))
 
 
 def table(rows: Sequence[tuple[str, Row]]) -> Table:

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TextIO
 
@@ -12,10 +12,20 @@ from dmpcli.errors import printable
 from dmpcli.records import tolerance_mark
 from dmpcli.records.dataset import BatchFolder
 from dmpcli.records.learning_record import Lesson
-from dmpcli.records.record import Record
+from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import OK
-from dmpcli.reporting import contact, paper_tables, ranking, stroke_measures, tables
+from dmpcli.reporting import (
+    contact,
+    paper_tables,
+    pose_errors,
+    provenance,
+    ranking,
+    stroke_measures,
+    summary,
+    tables,
+)
 from dmpcli.reporting.batch import MeasuredBatch
+from dmpcli.reporting.pose_errors import Compared
 from dmpcli.reporting.ranking import Pupil
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke
@@ -68,6 +78,10 @@ class DocumentPart:
         Of more than `MOST_ROWS` strokes.
     many : MeasuredBatch, optional
         Such a batch as measured; then `strokes` are those of them that are drawn.
+    origin : Provenance, optional
+        Where one of our own files comes from.
+    compared : Compared, optional
+        Pose by pose with the first of its kind, or with its plan.
     ids : list of str
         Of the strokes of a smaller batch.
     """
@@ -83,6 +97,8 @@ class DocumentPart:
     states: dict[str, int] | None = None
     batch: BatchFolder | None = None
     many: MeasuredBatch | None = None
+    origin: Provenance | None = None
+    compared: Compared | None = None
     ids: list[str] = field(default_factory=list)
 
 
@@ -103,7 +119,7 @@ def reference_of(parts: Sequence[DocumentPart]) -> ReportedStroke | None:
     return next((s for s in taught if s.role == "demonstration"), taught[0] if taught else None)
 
 
-def document(parts: Sequence[DocumentPart], surface: Row | None = None) -> Row:
+def document(parts: Sequence[DocumentPart], surface: Row | None = None, paper: bool = False) -> Row:
     """Measure everything; the same inputs give the same document.
 
     Parameters
@@ -112,13 +128,16 @@ def document(parts: Sequence[DocumentPart], surface: Row | None = None) -> Row:
         In the order of the command line.
     surface : dict, optional
         Name and provenance of the surface that the strokes were placed on.
+    paper : bool
+        Whether to set the paper's tables beside ours.
     """
     reference = reference_of(parts)
     strokes = [stroke for part in parts for stroke in part.strokes]
-    return {
+    made = {
         "schema": NAME,
         "version": VERSION,
         "tool": __version__,
+        "summary": [],
         "units": UNITS,
         "reference": reference.label if reference else None,
         "surface": surface,
@@ -127,8 +146,10 @@ def document(parts: Sequence[DocumentPart], surface: Row | None = None) -> Row:
             [part.pupil for part in parts if part.pupil],
             [part.recorded for part in parts if part.recorded],
         ),
-        "paper": paper_tables.comparisons(strokes),
+        "paper": paper_tables.comparisons(strokes) if paper else [],
     }
+    made["summary"] = summary.sentences(made)
+    return made
 
 
 def as_json(report: Row) -> bytes:
@@ -179,35 +200,55 @@ def _counted(states: Mapping[str, int]) -> str:
 def as_text(report: Row, width: int) -> str:
     """Return the document as tables for people, `width` columns wide, without terminal codes."""
     parts: list[Table | str] = []
+    for group in groups(report):
+        parts += [*group, ""]
+    return tables.plain(parts[:-1], width)
+
+
+def groups(report: Row) -> Iterator[list[Table | str]]:
+    """Yield the document's tables, each with what there is to say of it."""
     rows = _rows(report)
     if rows:
-        parts += [tables.shape(rows), *_remarks(report, rows), ""]
+        yield [tables.shape(rows), *_remarks(report, rows)]
         for table in (tables.waves(rows), tables.motion(rows), tables.drag(rows)):
-            parts += [table, ""] if table else []
-        parts += _on_surface(report, rows)
+            if table:
+                yield [table]
+        yield from _on_surface(report, rows)
     said = warnings(report)
-    parts += [*said, ""] if said else []
+    if said:
+        yield list(said)
     for entry in report["files"]:
-        if entry["statistics"]:
-            parts += [tables.statistics(entry["file"], entry), ""]
-        if entry["worst"]:
-            parts += [tables.worst(entry["file"], entry), ""]
-        if entry["failures"]:
-            parts += [tables.failures(entry["file"], entry["failures"]), ""]
-        if entry["states"]:
-            parts += [f"{entry['file']}: {_counted(entry['states'])}", ""]
+        yield from _batch(entry)
+    yield from _runs(report)
+    if report["skills"]:
+        yield [ranking.table(report["skills"]), *ranking.notes(report["skills"])]
+    for comparison in report["paper"]:
+        yield [tables.paper(comparison), *comparison["notes"]]
+
+
+def _batch(entry: Row) -> Iterator[list[Table | str]]:
+    """Tables of a file of many strokes, and what became of its pairs."""
+    if entry["statistics"]:
+        yield [tables.statistics(entry["file"], entry)]
+    if entry["worst"]:
+        yield [tables.worst(entry["file"], entry)]
+    if entry["failures"]:
+        yield [tables.failures(entry["file"], entry["failures"])]
+    if entry["states"]:
+        yield [f"{entry['file']}: {_counted(entry['states'])}"]
+
+
+def _runs(report: Row) -> Iterator[list[Table | str]]:
+    """Tables of deadlines, contact and pose errors."""
     runs = [(e["file"], e["deadlines"]) for e in report["files"] if e["deadlines"]]
     if runs:
-        parts += [tables.deadlines(runs), ""]
+        yield [tables.deadlines(runs)]
     pressed = [(e["file"], e["contact"]) for e in report["files"] if e["contact"]]
     if pressed:
-        parts += [contact.table(pressed), ""]
-    if report["skills"]:
-        rows = report["skills"]
-        parts += [ranking.table(rows), *ranking.notes(rows), ""]
-    for comparison in report["paper"]:
-        parts += [tables.paper(comparison), *comparison["notes"], ""]
-    return tables.plain(parts[:-1], width)
+        yield [contact.table(pressed)]
+    pairs = [entry["pose_error"] for entry in report["files"] if entry["pose_error"]]
+    if pairs:
+        yield [pose_errors.table(pairs), *pose_errors.remarks(pairs)]
 
 
 def _entry(part: DocumentPart, reference: ReportedStroke | None) -> Row:
@@ -231,6 +272,8 @@ def _entry(part: DocumentPart, reference: ReportedStroke | None) -> Row:
         "deadlines": stroke_measures.deadlines_of(part.run) if part.run else None,
         "contact": contact.contact_of(part.run) if part.run else None,
         "skill": stroke_measures.skill_of(part.pupil.file) if part.pupil else None,
+        "pose_error": pose_errors.row_of(part.compared) if part.compared else None,
+        "provenance": provenance.row_of(part.origin),
     }
     return entry | (part.many.entry() if part.many else {})
 
@@ -244,14 +287,14 @@ def _rows(report: Row) -> list[Row]:
     return [row for entry in report["files"] for row in entry["strokes"]]
 
 
-def _on_surface(report: Row, rows: Sequence[Row]) -> list[Table | str]:
+def _on_surface(report: Row, rows: Sequence[Row]) -> Iterator[list[Table | str]]:
     """Tables of how the strokes lie on the surface, and what there is to say about them."""
     if report["surface"] is None:
-        return []
-    parts: list[Table | str] = []
+        return
     for table in (tables.on_surface(report["surface"]["file"], rows), tables.along_surface(rows)):
-        parts += [table, ""] if table else []
-    remarks = []
+        if table:
+            yield [table]
+    remarks: list[Table | str] = []
     for row in rows:
         lies = row["surface"]
         if lies and lies["remark"]:
@@ -263,7 +306,8 @@ def _on_surface(report: Row, rows: Sequence[Row]) -> list[Table | str]:
             )
         if lies:
             remarks += _contact(row, lies)
-    return [*parts, *remarks, ""] if remarks else parts
+    if remarks:
+        yield remarks
 
 
 def _contact(row: Row, lies: Row) -> list[str]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from dmpcli.arrays import Floats
 from dmpcli.reporting import drawing
-from dmpcli.reporting.drawing import PlottedCurve
+from dmpcli.reporting.drawing import PlottedCurve, Seen
 
 _WIDE, _LEAST, _TALL = 5.9, 1.2, 6.0
 _EDGE = 0.85
@@ -37,7 +37,7 @@ def plane_curves(
         Curves that the legend names; all of them otherwise.
     """
     named = curves if legend is None else legend
-    names, seen = _view(start, axes)
+    names, seen = view(start, axes)
     flat = np.vstack([seen(curve.position) for curve in curves] + [seen(np.stack([start, goal]))])
     (x0, y0, _), (x1, y1, _) = flat.min(axis=0), flat.max(axis=0)
     x_limits, y_limits = drawing.spanned(x0, x1), drawing.spanned(y0, y1)
@@ -74,17 +74,8 @@ def plane_curves(
     return figure
 
 
-def _view(start: Floats, axes: Floats | None) -> tuple[tuple[str, str, str], "_Seen"]:
+def view(start: Floats, axes: Floats | None) -> tuple[tuple[str, str, str], Seen]:
+    """Return what the axes of a figure are called, and the coordinates that it shows."""
     if axes is None or abs(axes[2, 2]) > _LEVEL:
-        return ("X / mm", "Y / mm", "Z / mm"), _Seen(np.zeros(3), np.eye(3))
-    return ("along / mm", "across / mm", "off / mm"), _Seen(start, axes)
-
-
-class _Seen:
-    """Coordinates in which a figure shows positions (n, 3)."""
-
-    def __init__(self, origin: Floats, axes: Floats) -> None:
-        self.origin, self.axes = origin, axes
-
-    def __call__(self, position: Floats) -> Floats:
-        return np.asarray((position - self.origin) @ self.axes)
+        return ("X / mm", "Y / mm", "Z / mm"), Seen(np.zeros(3), np.eye(3))
+    return ("along / mm", "across / mm", "off / mm"), Seen(start, axes)

@@ -43,6 +43,8 @@ class Recorded:
         Those that the report was given, by their facts.
     skills : sequence of (Lesson, Skill)
         Those that the report was given.
+    began : float, optional
+        What the recording's own clock showed at time 0, s; None where that is not known.
     """
 
     recording: Trajectory
@@ -53,6 +55,7 @@ class Recorded:
     origin: Provenance = field(default_factory=lambda: Provenance(""))
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     skills: Sequence[tuple[Lesson, Skill]] = ()
+    began: float | None = None
 
     def __post_init__(self) -> None:
         self._views: dict[Lesson, ReportedStroke] = {}
@@ -146,6 +149,7 @@ class Recorded:
             noise=seen.sigma,
             elsewhere=elsewhere,
             by_skill=skill is not None,
+            rotation=None if seen.rotation is None else seen.rotation(t),
             **self._said(),
         )
 

@@ -12,6 +12,7 @@ from dmpcli.metrics.on_surface import wave_along
 from dmpcli.metrics.wave_height import WaveHeights, stroke_wave
 from dmpcli.records.learning_record import Lesson
 from dmpcli.reporting.surface_placement import SurfacePlacement
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces import plane
 
 NEAR = 1.0
@@ -144,6 +145,11 @@ class ReportedStroke:
         if self.geodesic is not None:
             return self.geodesic
         return float(np.linalg.norm(self.goal - self.start))
+
+    @property
+    def poses(self) -> Trajectory:
+        """Where the tool is at each sample."""
+        return Trajectory(self.t, self.position, self.rotation)
 
     def at_place_of(self, other: "ReportedStroke") -> bool:
         """Tell whether both strokes begin and end within 1 mm of each other."""

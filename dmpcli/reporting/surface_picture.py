@@ -34,7 +34,7 @@ def picture(ground: ReportSurface, low: Floats, high: Floats) -> list[Floats]:
     """
     size = float(np.linalg.norm(high - low))
     if ground.V is None or ground.F is None:
-        corners = _sheet(ground, low, high)
+        corners = sheet(ground, low, high)
     else:
         corners = _near(ground.V[ground.F], low, high)
         if len(corners) > MOST_FACES:
@@ -50,7 +50,7 @@ def shades(polygons: Sequence[Floats], light: Floats) -> Floats:
     return np.repeat(DARK + (LIGHT - DARK) * facing[:, None], 3, axis=1)
 
 
-def _sheet(ground: ReportSurface, low: Floats, high: Floats) -> Floats:
+def sheet(ground: ReportSurface, low: Floats, high: Floats) -> Floats:
     """Triangles of an exact surface that cover its part in the box: two of a plane.
 
     Of a cylinder and a sphere a chart's grid about the point nearest to the middle of the box.

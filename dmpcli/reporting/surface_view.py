@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,9 +10,10 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Floats
 from dmpcli.reporting import drawing
 from dmpcli.reporting.drawing import PlottedCurve, curve_of
+from dmpcli.reporting.part_figure import runs
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.style import STYLES
@@ -193,7 +193,7 @@ def _view(
     inside += [s.footing.height < -LEAVES for s in strokes if s.footing is not None]
     for curve, hidden in zip(curves, inside, strict=True):
         style = curve.style
-        for rows in _runs(hidden):
+        for rows in runs(hidden):
             axes.plot(
                 *curve.position[rows].T, color=style.color, ls=style.line, lw=style.width,
                 alpha=BURIED if hidden[rows.start] else 1.0, zorder=style.order + 10,
@@ -220,13 +220,6 @@ def _inches_per_mm(axes: Axes3D, scene: _Scene) -> float:
     x, y, _ = proj_transform(*ends.T, axes.get_proj())
     seen = axes.transData.transform(np.column_stack([x, y]))
     return float(np.linalg.norm(seen[1] - seen[0]) / axes.get_figure(root=True).dpi)
-
-
-def _runs(marks: Booleans) -> list[slice]:
-    """Stretches of equal marks (n,), each up to and with the first sample of the next."""
-    cuts = np.flatnonzero(marks[1:] != marks[:-1]) + 1
-    borders = [0, *cuts.tolist(), len(marks) - 1]
-    return [slice(a, b + 1) for a, b in pairwise(borders)]
 
 
 def _stems(stroke: ReportedStroke) -> Floats:

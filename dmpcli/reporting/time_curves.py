@@ -23,7 +23,7 @@ def time_curves(curves: Sequence[PlottedCurve]) -> Figure:
     columns = 2
     foot = _BOTTOM + drawing.ROW * drawing.legend_rows(curves, columns)
     figure = drawing.page(_LEFT + _WIDTH + _RIGHT, foot + 3 * _HEIGHT + 2 * _GAP + _TOP)
-    swing = _swing_axis(curves)
+    swing = swing_axis(curves)
     for i, name in enumerate("XYZ"):
         bottom = foot + (2 - i) * (_HEIGHT + _GAP)
         axes = drawing.panel(figure, _LEFT, bottom, _WIDTH, _HEIGHT)
@@ -45,7 +45,7 @@ def time_curves(curves: Sequence[PlottedCurve]) -> Figure:
     return figure
 
 
-def _swing_axis(curves: Sequence[PlottedCurve]) -> int:
+def swing_axis(curves: Sequence[PlottedCurve]) -> int:
     """Find the base axis on which the curves turn back and forth most; y where none does."""
     turning = [sum(_turns(curve, axis) for curve in curves) for axis in range(3)]
     return int(np.argmax(turning)) if max(turning) > 0.0 else 1

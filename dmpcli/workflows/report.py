@@ -5,6 +5,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from dmpcli.records.atomic_text import growing
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.learning_record import surface_key
-from dmpcli.reporting import document
+from dmpcli.reporting import document, pose_errors, provenance
 from dmpcli.reporting.batch import STROKES, Tables, measure
 from dmpcli.reporting.batch_measures import MeasurementContext
 from dmpcli.reporting.document import (
@@ -35,9 +36,13 @@ from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
-from dmpcli.workflows.recording import recording
+from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.workflows import recording
 from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
+
+if TYPE_CHECKING:
+    from dmpcli.reporting import figures
 
 WIDTH = 80
 """Columns that tables are printed in where no terminal says otherwise."""
@@ -94,6 +99,9 @@ def report(
     read: SurfaceInput | None,
     output: Path | None,
     grounds: SiteGrounds | None = None,
+    paper: bool = False,
+    view: bool = False,
+    png: bool = False,
 ) -> StrokeReport:
     """Compare strokes, write the report's folder where one is named, and tell what is doubtful.
 
@@ -109,9 +117,15 @@ def report(
     read : SurfaceInput, optional
         What the strokes lie on.
     output : Path, optional
-        Folder of JSON, CSV and figures.
+        Folder of the page, JSON, CSV and figures.
     grounds : SiteGrounds, optional
         What the strokes of batches lie on, each on its own.
+    paper : bool
+        Whether to set the paper's tables beside ours and to draw its figures instead of ours.
+    view : bool
+        Whether to write a part that can be turned, too.
+    png : bool
+        Whether to write the figures as PNG, too.
 
     Raises
     ------
@@ -138,13 +152,15 @@ def report(
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = MeasurementContext(reference_of(parts), ground, normal, grounds=grounds)
         parts = _measured(parts, sight, tables)
-        made = document.document(parts, said)
+        if not paper:
+            parts = _compared(parts)
+        made = document.document(parts, said, paper)
         for line in document.warnings(made):
             warn(line)
         if output is not None:
-            written = _write(output, made, parts, ground)
+            written = _write(output, made, parts, ground, paper, view, png)
     if output is not None:
-        tell(f"{output}: wrote {', '.join(written)}")
+        tell(f"{output}: wrote {written}")
     return StrokeReport(made)
 
 
@@ -163,20 +179,24 @@ def _part(
         learned, file = skills.decode(source)
         with about(source.name):
             pupil = Pupil(label, learned, file, learning_record.of_skill(file))
-        return DocumentPart(label, source.sha256, skills.SCHEMA, pupil=pupil)
+        origin = provenance.of_skill(file)
+        return DocumentPart(label, source.sha256, skills.SCHEMA, pupil=pupil, origin=origin)
     found = records.decode(source) if records.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        read = recording(source, None if found else form)
+        seen = recording.whole(source, None if found else form)
         kind = "recording" if found is None else "demonstration"
-        recorded = Recorded(read, label, source.name, source.sha256, normal)
+        recorded = Recorded(
+            seen.stroke, label, source.name, source.sha256, normal, began=seen.began
+        )
         if found is not None:
             recorded.origin = found.provenance
-        return DocumentPart(label, source.sha256, kind, recorded=recorded)
+        return DocumentPart(label, source.sha256, kind, recorded=recorded, origin=recorded.origin)
     run = found if found.schema is schemas.RUN else None
     states = None if run is None else states_of(run)
     with about(source.name):
         strokes = strokes_of(found, label, normal)
-    return DocumentPart(label, source.sha256, found.schema.name, strokes, run, states=states)
+    name, origin = found.schema.name, found.provenance
+    return DocumentPart(label, source.sha256, name, strokes, run, states=states, origin=origin)
 
 
 def _batch(
@@ -191,7 +211,14 @@ def _batch(
     if len(batch) > MOST_ROWS:
         with about(str(folder)):
             drawn_by = learning_record.of_facts(dataset.facts_of(batch))
-        return DocumentPart(label, batch.sha256, schemas.PAIRS.name, batch=batch, lesson=drawn_by)
+        return DocumentPart(
+            label,
+            batch.sha256,
+            schemas.PAIRS.name,
+            batch=batch,
+            lesson=drawn_by,
+            origin=batch.provenance,
+        )
     pairs = records.decode(file_io.read_table(folder), schemas.PAIRS)
     known, states = pairs_of(pairs)
     strokes, ids = [], []
@@ -200,7 +227,8 @@ def _batch(
         with about(part.name):
             strokes += strokes_of(part, label, normal, known)
         ids += list(dict.fromkeys(part.columns["id"]))
-    return DocumentPart(label, pairs.sha256, schemas.PAIRS.name, strokes, states=states, ids=ids)
+    name, origin = schemas.PAIRS.name, pairs.provenance
+    return DocumentPart(label, pairs.sha256, name, strokes, states=states, ids=ids, origin=origin)
 
 
 def _ground(read: SurfaceInput) -> tuple[ReportSurface, Row, Floats | None]:
@@ -317,27 +345,98 @@ def _measured(
     return done
 
 
-def _write(
-    output: Path, report: Row, parts: list[DocumentPart], ground: ReportSurface | None
-) -> list[str]:
-    """Write each file whole; return their names."""
-    from dmpcli.reporting import batch_figures, figures  # load matplotlib
+def _compared(parts: list[DocumentPart]) -> list[DocumentPart]:
+    """Set recordings beside the first recording, strokes beside the first, runs beside their plans.
 
-    strokes = [stroke for part in parts for stroke in part.strokes]
-    files = {
-        "report.json": document.as_json(report),
-        **figures.gallery(strokes, ground),
-        **figures.spreads([part.pupil.skill for part in parts if part.pupil]),
-        **batch_figures.batch_figures([part.many for part in parts if part.many]),
-    }
-    # Figures of an earlier report that this one does not draw would be taken for its own.
-    ours = ("fig[0-9]_*.*", "batch_*.*", "spread_*.*")
-    for old in [path for name in ours for path in output.glob(name)]:
-        if old.name not in files and old.suffix in (".svg", ".png"):
-            old.unlink()
+    A trajectory is not set beside a recording: what it differs by is first of all where and when it
+    was to be drawn.
+    """
+    recorded = [part for part in parts if part.recorded]
+    planned = [part for part in parts if part.strokes and not part.recorded and not part.run]
+    done = []
+    for part in parts:
+        found = None
+        if part.run is not None:
+            found = pose_errors.followed(part.run, part.name)
+        elif part.recorded and part is not recorded[0]:
+            found = pose_errors.compared(
+                part.name, recorded[0].name, *_by_one_clock(part.recorded, recorded[0])
+            )
+        elif len(part.strokes) == 1 and not recorded and part is not planned[0]:
+            first = planned[0]
+            if len(first.strokes) == 1:
+                found = pose_errors.compared(
+                    part.name, first.name, part.strokes[0].poses, first.strokes[0].poses
+                )
+        done.append(replace(part, compared=found))
+    return done
+
+
+def _by_one_clock(one: Recorded, first: DocumentPart) -> tuple[Trajectory, Trajectory]:
+    """Return two recordings with times of one clock; of their own where a file tells none."""
+    assert first.recorded is not None
+    here, there = one.recording, first.recorded.recording
+    if one.began is None or first.recorded.began is None:
+        return here, there
+    return replace(here, t=here.t + (one.began - first.recorded.began)), there
+
+
+def _write(
+    output: Path,
+    report: Row,
+    parts: list[DocumentPart],
+    ground: ReportSurface | None,
+    paper: bool,
+    view: bool,
+    png: bool,
+) -> str:
+    """Write each file whole; return their names."""
+    from dmpcli.reporting import figures, page  # load matplotlib
+
+    files = {"report.json": document.as_json(report)}
+    drawn = figures.gallery(_shown(report, parts, ground, png or paper))
+    if paper:
+        strokes = [stroke for part in parts for stroke in part.strokes]
+        drawn = [figure for figure in drawn if figure.name.startswith(("batch", "spread"))]
+        from dmpcli.reporting import paper_figures
+
+        files |= paper_figures.gallery(strokes, ground)
+    else:
+        files["report.html"] = page.page(report, drawn)
+    for figure in drawn:
+        files |= {f"{figure.name}.{suffix}": content for suffix, content in figure.files.items()}
+    if view:
+        from dmpcli.reporting import turnable
+
+        strokes = [stroke for part in parts for stroke in part.strokes]
+        files["view.html"] = turnable.page(strokes, ground, [p.run for p in parts if p.run])
+    # What an earlier report wrote and this one does not would be taken for its own.
+    ours = ("fig[0-9]_*", "batch_*", *(f"{name}*" for name in figures.NAMES))
+    old = [path for name in ours for path in output.glob(name) if path.suffix in (".svg", ".png")]
+    old += [output / name for name in ("report.html", "view.html")]
+    for path in old:
+        if path.name not in files:
+            path.unlink(missing_ok=True)
     batches = any(part.many for part in parts)
     if not batches:
         (output / _STROKES).unlink(missing_ok=True)
     for name, content in files.items():
         file_io.write(output / name, content)
-    return [*files, _WAVES, *([_STROKES] if batches else [])]
+    return ", ".join([*files, _WAVES, *([_STROKES] if batches else [])])
+
+
+def _shown(
+    report: Row, parts: list[DocumentPart], ground: ReportSurface | None, png: bool
+) -> "figures.Shown":
+    from dmpcli.reporting import figures
+
+    entries = list(zip(parts, report["files"], strict=True))
+    return figures.Shown(
+        [stroke for part in parts for stroke in part.strokes],
+        ground,
+        [(part.name, part.run, entry["contact"]) for part, entry in entries if part.run],
+        [part.compared for part in parts if part.compared and not part.run],
+        [(part.name, part.pupil.skill) for part in parts if part.pupil],
+        [part.many for part in parts if part.many],
+        png,
+    )

@@ -26,6 +26,9 @@ def report(
     surface: Surface | None = None,
     output: str | Path | None = None,
     names: Sequence[str] | None = None,
+    paper: bool = False,
+    view: bool = False,
+    png: bool = False,
     **said: Any,
 ) -> StrokeReport:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines.
@@ -38,9 +41,15 @@ def report(
     surface : Surface, optional
         What the strokes lie on.
     output : str or Path, optional
-        Folder for JSON, CSV and figures.
+        Folder for the page, JSON, CSV and figures.
     names : sequence of str, optional
         What tables call them; by default their files' names, or what they are.
+    paper : bool
+        The paper's tables beside ours, and its figures instead of ours.
+    view : bool
+        Also a part that can be turned; extra ``dmpcli[view]``.
+    png : bool
+        Also the figures as PNG.
     **said
         How recordings of another program are read, as in `read`.
 
@@ -72,7 +81,8 @@ def report(
                 source = values.source_of(stroke)
                 inputs.append(source)
                 called.append(_free(source.name, called))
-        return reporting.report(inputs, names or labels_of(called), layout, on, folder)
+        named = names or labels_of(called)
+        return reporting.report(inputs, named, layout, on, folder, None, paper, view, png)
 
 
 def inspect(file: str | Path | Any) -> dict[str, Any]:

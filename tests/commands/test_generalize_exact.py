@@ -151,7 +151,7 @@ def test_report_measures_and_pictures_strokes_on_a_cylinder(learned, tube, tmp_p
     assert lies["wave_height"] == pytest.approx(49.979, abs=0.02)
     assert lies["distance_max"] < 0.005
     assert lies["geodesic"] == pytest.approx(LENGTH, abs=1e-3)
-    assert (tmp_path / "r" / "fig9_surface.svg").stat().st_size > 10_000
+    assert (tmp_path / "r" / "surface.svg").stat().st_size > 10_000
 
 
 def test_a_stroke_on_a_cylinder_is_executed(learned, tube, tmp_path):

@@ -115,7 +115,7 @@ def test_the_folder_holds_a_row_per_stroke_a_row_per_height_and_figures(tmp_path
     out = tmp_path / "out"
     assert dmpcli(demo, folder, "-o", out, "-q").exit_code == 0
     written = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert {"batch_distribution.png", "batch_worst.svg", "strokes.csv"} <= set(written)
+    assert {"batch_distribution.svg", "batch_worst.svg", "strokes.csv"} <= set(written)
     rows = list(csv.DictReader(written["strokes.csv"].decode().splitlines()))
     assert [row["id"] for row in rows] == [str(i + 1) for i in range(30)]
     assert [float(row["wave_height"]) for row in rows] == pytest.approx(list(HEIGHTS), abs=5e-3)

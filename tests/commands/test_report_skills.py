@@ -200,7 +200,7 @@ def test_several_demonstrations_show_their_spread(folder, demo):
     ]
     skill = fitted(folder, "mean", *others)
     out = folder / "spread"
-    run("report", *others, skill, "-o", out, "-q")
+    run("report", *others, skill, "-o", out, "--png", "-q")
     spread = json.loads((out / "report.json").read_text())["files"][-1]["skill"]["spread"]
     v = np.array(spread["deviation"])[:, 1]
     # Population or sample deviation of 23, 25, 27 mm at the crests.

@@ -1,4 +1,4 @@
-"""Figures: which ones, the same bytes twice, peaks marked, no panel filled by noise."""
+"""The paper's figures: which ones, the same bytes twice, peaks marked, no panel filled by noise."""
 
 import io
 import re
@@ -8,7 +8,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from dmpcli.reporting import drawing, figures
+from dmpcli.reporting import drawing
+from dmpcli.reporting import paper_figures as figures
 from dmpcli.reporting.drawing import curve_of
 from dmpcli.reporting.plane_curves import plane_curves
 from dmpcli.reporting.strokes import strokes_of

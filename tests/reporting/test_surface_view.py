@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dmpcli.records.learning_record import Lesson
-from dmpcli.reporting import document, figures
+from dmpcli.reporting import document
+from dmpcli.reporting import paper_figures as figures
 from dmpcli.reporting.report_surface import ReportSurface, placed
 from dmpcli.reporting.stroke_measures import row_of
 from dmpcli.reporting.strokes import strokes_of

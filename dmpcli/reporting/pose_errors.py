@@ -1,0 +1,209 @@
+"""Pose by pose: recordings and strokes beside the first one of their kind, runs beside plans."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from rich.table import Table
+
+from dmpcli.arrays import Floats, Integers
+from dmpcli.metrics import pose_error
+from dmpcli.metrics.motion import path_length
+from dmpcli.metrics.pose_error import Alignment, PoseErrors
+from dmpcli.records.record import Record
+from dmpcli.reporting import drawing, tables, tracking
+from dmpcli.reporting.stroke_measures import Row
+from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import Trajectory
+
+FEW = 0.9
+"""Where less than this share of the samples has a like it is said."""
+
+_WIDTH, _PANEL = 5.9, 1.3
+_LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.42, 0.3, 0.55
+_AS_IS, _ALIGNED = "#0072B2", "#D55E00"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two trajectories, sample by sample.
+
+    Attributes
+    ----------
+    name, against : str
+    reference, estimate : Trajectory
+        Of n samples each, paired.
+    lengths : tuple of float
+        Of the whole paths, reference and estimate, mm.
+    most : int
+        Samples of the shorter one: as many pairs there could be.
+    alignment : Alignment or None
+        What brings the estimate nearest to the reference.
+    """
+
+    name: str
+    against: str
+    reference: Trajectory
+    estimate: Trajectory
+    lengths: tuple[float, float]
+    most: int
+    alignment: Alignment | None
+
+    @property
+    def absolute(self) -> PoseErrors:
+        """APE as it is."""
+        return pose_error.absolute(self.reference, self.estimate)
+
+    @property
+    def aligned(self) -> PoseErrors | None:
+        """APE after alignment; None where there is none."""
+        if self.alignment is None:
+            return None
+        return pose_error.absolute(self.reference, self.alignment.apply(self.estimate))
+
+
+def compared(
+    name: str, against: str, estimate: Trajectory, reference: Trajectory
+) -> Compared | None:
+    """Pair two trajectories by time; None where fewer than two samples have a like."""
+    rows, others = pose_error.associate(reference.t, estimate.t)
+    if len(rows) < 2:
+        return None
+    there, here = _some(reference, rows), _some(estimate, others)
+    return Compared(
+        name,
+        against,
+        there,
+        here,
+        (path_length(reference.position), path_length(estimate.position)),
+        min(len(reference), len(estimate)),
+        pose_error.alignment(there.position, here.position),
+    )
+
+
+def followed(run: Record, name: str) -> Compared | None:
+    """Compare what an arm did while it drew with what was planned, one look-ahead before."""
+    rows = np.flatnonzero(run.columns["phase"] == "stroke")
+    if len(rows) < 2:
+        return None
+    drawn = tracking.reached(run, rows)
+    plan = Trajectory(drawn.t, drawn.position("plan"), drawn.rotation("plan"))
+    actual = Trajectory(drawn.t, drawn.position(), drawn.rotation())
+    return compared(name, "its plan", actual, plan)
+
+
+def row_of(pair: Compared) -> Row:
+    """Return what the document says of a pair: lengths in mm, angles in degrees."""
+    relative = pose_error.relative(pair.reference, pair.estimate)
+    found, aligned = pair.alignment, pair.aligned
+    sized = pose_error.alignment(pair.reference.position, pair.estimate.position, scaled=True)
+    gap = float(np.diff(pair.estimate.t).max())
+    return {
+        "stroke": pair.name,
+        "against": pair.against,
+        "pairs": len(pair.reference),
+        "of": pair.most,
+        "largest_gap": gap,
+        "length": pair.lengths[1],
+        "reference_length": pair.lengths[0],
+        "ape": _summaries(pair.absolute),
+        "rpe": _summaries(relative),
+        "aligned": None
+        if found is None or aligned is None
+        else {
+            "ape": _summaries(aligned),
+            "rotation": rotations.to_quaternion(found.pose.rotation[None])[0].tolist(),
+            "position": found.pose.position.tolist(),
+            "scale": None if sized is None else sized.scale,
+        },
+    }
+
+
+def table(rows: Sequence[Row]) -> Table:
+    """APE and RPE, root mean square; each pair with its names."""
+    made = Table(title="Pose error, RMS in mm and degrees", title_justify="left")
+    made.box, made.pad_edge = None, False
+    made.add_column("stroke", overflow="fold")
+    made.add_column("against", overflow="fold")
+    for name in ("pairs", "APE", "APE °", "aligned", "RPE", "RPE °"):
+        made.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        aligned = row["aligned"]["ape"]["position"]["rmse"] if row["aligned"] else None
+        made.add_row(
+            row["stroke"],
+            row["against"],
+            f"{row['pairs']}/{row['of']}",
+            tables.number(row["ape"]["position"]["rmse"], 4),
+            tables.number((row["ape"]["rotation"] or {}).get("rmse"), 3),
+            tables.number(aligned, 4),
+            tables.number(row["rpe"]["position"]["rmse"], 4),
+            tables.number((row["rpe"]["rotation"] or {}).get("rmse"), 4),
+        )
+    return made
+
+
+def remarks(rows: Sequence[Row]) -> list[str]:
+    """Say which pairs are fewer than they could be."""
+    return [
+        f"{row['stroke']}: only {row['pairs']} of {row['of']} samples have one of "
+        f"{row['against']} within {pose_error.MOST_APART:g} s, with a gap of "
+        f"{row['largest_gap']:.3g} s: RPE is from pair to pair, so that a gap counts as one step; "
+        "look at the clocks."
+        for row in rows
+        if row["pairs"] < FEW * row["of"]
+    ]
+
+
+def figure(pair: Compared) -> Figure:
+    """Draw the absolute error of position (a) and of rotation (b) over time, as is and aligned."""
+    parts = [("position", "off / mm", 1.0)]
+    if pair.absolute.rotation is not None:
+        parts.append(("rotation", "turned / °", 180.0 / np.pi))
+    foot = _BOTTOM + 2 * drawing.ROW
+    height = foot + len(parts) * _PANEL + (len(parts) - 1) * _GAP + _TOP
+    made = drawing.page(_LEFT + _WIDTH + _RIGHT, height)
+    for i, (name, unit, factor) in enumerate(parts):
+        bottom = foot + (len(parts) - 1 - i) * (_PANEL + _GAP)
+        axes = drawing.panel(made, _LEFT, bottom, _WIDTH, _PANEL)
+        _panel(axes, pair, name, factor)
+        drawing.labels(axes, y=unit)
+        drawing.title(axes, f"({'ab'[i]})  {name}")
+        axes.tick_params(labelbottom=i == len(parts) - 1)
+    drawing.labels(axes, x="t / s")
+    key = [
+        (Line2D([], [], color=_AS_IS, lw=1.3), "as it is"),
+        (Line2D([], [], color=_ALIGNED, lw=1.3, ls="--"), "after alignment"),
+        (Line2D([], [], color=_AS_IS, lw=0.8, ls=":"), "root mean square as it is"),
+        (Line2D([], [], color=_ALIGNED, lw=0.8, ls=":"), "root mean square after alignment"),
+    ]
+    made.legend([line for line, _ in key], [text for _, text in key], loc="lower center", ncols=2)
+    return made
+
+
+def _panel(axes: Axes, pair: Compared, name: str, factor: float) -> None:
+    largest = 0.0
+    for errors, colour, line in ((pair.absolute, _AS_IS, "-"), (pair.aligned, _ALIGNED, "--")):
+        values = None if errors is None else getattr(errors, name)
+        if values is None:
+            continue
+        axes.plot(pair.estimate.t, factor * values, color=colour, lw=1.3, ls=line)
+        axes.axhline(factor * pose_error.summary(values)["rmse"], color=colour, lw=0.8, ls=":")
+        largest = max(largest, factor * float(values.max()))
+    axes.set_ylim(0.0, 1.1 * largest or 1.0)
+    axes.set_xlim(float(pair.estimate.t[0]), float(pair.estimate.t[-1]))
+
+
+def _some(one: Trajectory, rows: Integers) -> Trajectory:
+    rotation = None if one.rotation is None else one.rotation[rows]
+    return Trajectory(one.t[rows], one.position[rows], rotation)
+
+
+def _summaries(errors: PoseErrors) -> Row:
+    turned: Floats | None = errors.rotation
+    return {
+        "position": pose_error.summary(errors.position),
+        "rotation": None if turned is None else pose_error.summary(np.degrees(turned)),
+    }
