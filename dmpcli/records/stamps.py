@@ -44,7 +44,8 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
     """
     if nanoseconds is not None:
         t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
-        return t - t[0]
+        found: Floats = t - t[0]
+        return found
     values: Any = table.columns.get(column)
     if isinstance(values, pa.Array | pa.ChunkedArray):
         dates = _dates(values)
