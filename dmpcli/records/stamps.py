@@ -43,9 +43,9 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
         A value is no time; names the row.
     """
     if nanoseconds is not None:
-        t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
-        found: Floats = t - t[0]
-        return found
+        t: Floats = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
+        t -= t[0]
+        return t
     values: Any = table.columns.get(column)
     if isinstance(values, pa.Array | pa.ChunkedArray):
         dates = _dates(values)
