@@ -130,7 +130,9 @@ def rows_of(log):
     columns = (t, t_plan, *poses, deadline, lateness, wrench, coupling)
     force = rows.numbers("fn") if "fn" in rows.groups else np.zeros(count)
     contact = rows.words("contact") if "contact" in rows.texts else [""] * count
-    words = (rows.words("state"), rows.words("phase"), ids, force, contact)
+    events = rows.words("event") if "event" in rows.texts else [""] * count
+    joints = list(rows.numbers("joints")) if "joints" in rows.groups else [None] * count
+    words = (rows.words("state"), rows.words("phase"), ids, joints, events, force, contact)
     return [Row(*row) for row in zip(*columns, *words, strict=True)]
 
 
