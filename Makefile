@@ -135,6 +135,7 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python -m benchmarks.csv_reading
+	$(BIN)/python -m benchmarks.mcap_import
 	$(BIN)/python benchmarks/mesh_load.py
 	$(BIN)/python -m benchmarks.surfaces
 	$(BIN)/python -m benchmarks.taught_surfaces

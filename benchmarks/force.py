@@ -18,6 +18,7 @@ import logging
 import multiprocessing
 import tempfile
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from dmpcli.arrays import Floats
 from dmpcli.bench import options
 from dmpcli.bench.workpiece import Flat, Round
 from dmpcli.bench.world import World
+from dmpcli.control.execution import SENSOR_RATE
 from dmpcli.errors import DmpError
 from dmpcli.metrics.wave_height import stroke_wave
 from dmpcli.records import file_io, record, schemas
@@ -67,6 +69,7 @@ class Case:
     settings: dict[str, Any] = field(default_factory=dict)
 
 
+@lru_cache
 def planned(plan: str, offset: float) -> dmpcli.Trajectory:
     """Return the stroke on the surface that the plan knows, so far off it, mm."""
     skill = dmpcli.fit(dmpcli.read(ROOT / "sample_runs" / "reference.parquet"))
@@ -148,6 +151,7 @@ def measured(
         "landing": float(push[before].max()),
         "facts": log.provenance.facts,
         "lateral": float(np.hypot(true["fx"], true["fy"]).max()),
+        "unavoidable": unavoidable(said, true),
     }
     # What a set-point says shows a look-ahead later.
     late = round((float(said.get("delay", 0.0)) + LAG + PERIOD) / (true["t"][1] - true["t"][0]))
@@ -175,6 +179,28 @@ def measured(
         found["off"] = float(off.max()) if len(off) else np.nan
         found["wave"] = float(np.abs(heights[0] - heights[1]).max()) if same else np.nan
     return found
+
+
+def unavoidable(said: dict[str, str], true: dict[str, Floats]) -> float:
+    """Force across the pen that a loop cannot avoid where it meets a wall, N; 0 where none is met.
+
+    The arm goes on at its speed before the wall, against its own stiffness in that direction, until
+    what was felt can show: a reading, a period, and the look-ahead of the arm.
+    """
+    across = np.hypot(true["fx"], true["fy"]) - 0.5 * np.abs(true["fz"])
+    hit = int(np.argmax(across > 2.0))
+    if not across[hit] > 2.0:
+        return 0.0
+    tip = np.column_stack([true[key] for key in "xyz"])
+    step = float(true["t"][1] - true["t"][0])
+    before = max(hit - round(0.1 / step), 0)
+    velocity = (tip[hit] - tip[before]) / (step * max(hit - before, 1))
+    velocity[2] = 0.0
+    speed = float(np.linalg.norm(velocity))
+    way = velocity / speed
+    compliance = World(options.parameters("ec66", said)).compliance
+    reaction = 1.0 / SENSOR_RATE + PERIOD + PERIOD + LAG + float(said.get("delay", 0.0))
+    return speed * reaction / float(way @ compliance @ way)
 
 
 def finely(path: Floats) -> Floats:
@@ -306,16 +332,20 @@ def cell(results: list[dict[str, Any]]) -> str:
         return f"not drawn, peak {peak:.1f} N: {'; '.join(said)}"
 
     def worst(key: str) -> float:
-        return max(one.get(key, np.nan) for one in drawn)
+        return max(float(one.get(key, np.nan)) for one in drawn)
 
     contact = min(one["contact"] for one in drawn)
     text = (
         f"{100 * contact:.2f} % | {worst('rms'):.3f} | {worst('peak'):.2f} | "
         f"{worst('landing'):.2f} | {worst('off'):.3f} | {worst('wave'):.3f}"
     )
-    return text + (
-        f" | {len([o for o in results if o['why']])} × {'; '.join(said)}" if said else " |"
-    )
+    walls = worst("unavoidable")
+    if walls:
+        text += f" | across {worst('lateral'):.0f} N, unavoidable {walls:.0f};"
+    else:
+        text += " |"
+    stopped = sum(bool(one["why"]) for one in results)
+    return f"{text} {stopped} × {'; '.join(said)}" if said else f"{text} done"
 
 
 HEAD = "contact | RMS, N | peak, N | landing, N | off, mm | wave, mm | ended"

@@ -32,6 +32,7 @@ from dmpcli.control.signals import Interruption
 from dmpcli.control.watchdog import watched
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.planning import plan as planning
+from dmpcli.planning.limits import limits_of
 from dmpcli.records import file_io, schemas
 from dmpcli.records import tool as tool_file
 from dmpcli.records.journal import Journal
@@ -153,10 +154,10 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     here = servo.state()
     stroke = replace(stroke, position=stroke.position + here.position - stroke.position[0])
     start = stroke.position[0], here.rotation
-    plan = planning.make(stroke, period, 1.0, settings.limits, start, 20.0)
+    plan = planning.make(stroke, period, 1.0, limits_of(settings), start, 20.0)
     watch = StopLimits(100.0, 1.0, 1e3, 1e3)
     touch = execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
-    loop = ServoLoop(plan, settings.limits, watch, arm, touch)
+    loop = ServoLoop(plan, limits_of(settings), watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))
     outcome = loop.run(Interruption())

@@ -28,7 +28,7 @@ COMMANDS = {
     "report": "Compare strokes: wave heights, deviation, smoothness, ends, deadlines.",
     "import": "Make demonstrations of other programs' recordings, drawings and robot programs.",
     "export": "Write a motion as other programs read it: tables, bags, polylines, robot programs.",
-    "inspect": "Say what a file is: schema, columns, units, ranges, provenance.",
+    "inspect": "Say what a file is: schema, columns, units, ranges, provenance; how fit reads it.",
     "recover": "Make the file that a crash kept `record` or `execute` from writing.",
     "register": "Find where a part lies from points touched on it.",
     "simulate": "Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C.",

@@ -6,6 +6,7 @@ It draws on standard error what stands in the shared memory FD (`SharedSnapshot`
 the lines that come on standard input, and ends with that. The loop neither knows nor waits for it.
 """
 
+import contextlib
 import json
 import math
 import mmap
@@ -107,12 +108,15 @@ def table(seen: Mapping[str, Any]) -> "Table":
 
 def show(fd: int) -> None:
     """Draw until standard input ends."""
+    # Whatever priority the loop was given, the picture has none.
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.nice(19)
     from rich.console import Console
     from rich.live import Live
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    os.nice(10)
     memory, ended = SharedSnapshot(fd), threading.Event()
     with Live(console=Console(stderr=True), auto_refresh=False, transient=False) as live:
 

@@ -36,7 +36,8 @@ def main() -> None:
     wanted: dict[str, Make] = {}
     for name in asked.reader or GROUPS:
         wanted |= GROUPS[name] if name in GROUPS else {name: MAKES[name]}
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for name in (signal.SIGTERM, signal.SIGINT):  # in the background SIGINT may be ignored
+        signal.signal(name, signal.default_int_handler)
     found: list[Findings] = []
 
     def kept() -> object:

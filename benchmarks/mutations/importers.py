@@ -3,7 +3,7 @@
 import functools
 import io
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,14 @@ from dmpcli.formats import (
     urscript,
 )
 from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.formats.toolpath import ProgramOptions
 from dmpcli.records import layouts, record
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.settings.import_file import ImportOptions
 from dmpcli.spatial.rotations import from_euler
-from dmpcli.workflows.import_file import demonstration, strokes_of
+from dmpcli.workflows.import_file import demonstrations, strokes_of
 from dmpcli.workflows.motions import evenly
 
 _SVG = (
@@ -53,14 +54,14 @@ def motion(turning: bool = True, samples: int = 20) -> Motion:
     return Motion("wave.parquet", "trajectory", [one])
 
 
-def _written(strokes: list[MotionStroke]) -> None:
+def _written(strokes: Sequence[MotionStroke | PoseBlocks], name: str) -> None:
     for one in strokes:
-        record.encode(demonstration(one, (), {}))
+        record.store_groups(demonstrations(one, (), {}, name), io.BytesIO())
 
 
 def _whole(kind: str, form: Layout | None = None) -> Read:
     def read(source: Source) -> None:
-        _written(strokes_of(source, kind, ImportOptions(), form))
+        _written(strokes_of(source, kind, ImportOptions(), form), source.name)
 
     return read
 
@@ -115,7 +116,7 @@ Sound = tuple[Read, str, tuple[bytes, ...]]
 def _mcap() -> Sound:
     def read(source: Source) -> None:
         stroke, _ = mcap_file.decode(io.BytesIO(source.content), source.name, None)
-        _written([stroke])
+        _written([stroke], source.name)
 
     return read, "m.mcap", (mcap_file.encode(motion()),)
 
@@ -174,7 +175,7 @@ def _in_folder(
         for stray in ("-journal", "-wal", "-shm"):
             path.with_name(path.name + stray).unlink(missing_ok=True)
         stroke, _ = read(folder)
-        _written([stroke])
+        _written([stroke], source.name)
 
     return Reader(name, changed, "m", (path.read_bytes(),))
 

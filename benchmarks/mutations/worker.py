@@ -24,8 +24,11 @@ from benchmarks.mutations.guard import Reader, tried
 MEMORY = 2**30
 """Bytes beyond what the process has at its start."""
 
-DEAF = 60.0
-"""s after which a process that does not come on is ended: it hangs outside of Python, or waits."""
+DEAF = 4.0 * guard.LONGEST
+"""s of the processor on one input after which a process is ended: it hears no alarm."""
+
+STILL = 600.0
+"""s of the clock on one input after which it is ended: it waits for what does not come."""
 
 MOST_DEATHS = 50
 """Of a reader's processes; what kills more is known by then."""
@@ -83,7 +86,7 @@ class Asked:
 
 
 # Places in the memory that a process shares with its parent.
-_NUMBER, _BEGIN, _READ, _REFUSED, _SLOWEST, _GROWN, _SPENT = range(7)
+_NUMBER, _BEGIN, _READ, _REFUSED, _SLOWEST, _GROWN, _SPENT, _USED = range(8)
 
 
 def run(
@@ -114,6 +117,7 @@ def run(
     for number in range(first, asked.count):
         if shared is not None:
             shared[_NUMBER], shared[_BEGIN] = number, time.monotonic()
+            shared[_USED] = time.process_time()
         content = reader.mutation(asked.seed, number)
         begin = time.process_time()
         kind, where = tried(reader, content)
@@ -181,7 +185,7 @@ class _Running:
 
     def start(self, asked: Asked, first: int) -> None:
         context = multiprocessing.get_context("fork")
-        self.shared = context.Array("d", 7, lock=False)
+        self.shared = context.Array("d", 8, lock=False)
         self.shared[_NUMBER] = first
         self.pipe, out = context.Pipe(duplex=False)
         task = (self.make, asked, first, Path(self.folder.name), self.shared, out)
@@ -191,7 +195,10 @@ class _Running:
         out.close()
 
     def deaf(self) -> bool:
-        return time.monotonic() - max(self.shared[_BEGIN], self.begun) > DEAF
+        if time.monotonic() - max(self.shared[_BEGIN], self.begun) > STILL:
+            return True
+        assert self.process is not None
+        return self.shared[_BEGIN] > 0.0 and _used(self.process) - self.shared[_USED] > DEAF
 
     def drain(self) -> None:
         try:
@@ -210,6 +217,15 @@ class _Running:
         self.found.slowest = max(self.found.slowest, s[_SLOWEST])
         self.found.grown = max(self.found.grown, int(s[_GROWN]))
         self.found.spent += s[_SPENT]
+
+
+def _used(process: BaseProcess) -> float:
+    """Processor time of a process, s; 0 where it is gone."""
+    try:
+        words = Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rpartition(")")[2]
+    except OSError:
+        return 0.0
+    return sum(map(int, words.split()[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
 def runs(makes: dict[str, Make], asked: Asked, jobs: int) -> Iterator[Findings]:
@@ -252,7 +268,7 @@ def _ended(one: _Running, asked: Asked) -> bool:
         if not one.deaf():
             return False
         one.process.kill()
-        how = f"hang: nothing for {DEAF:.0f} s, and no alarm heard"
+        how = "hang: no alarm heard"
     else:
         how = f"its process died: {one.process.exitcode}"
     one.process.join()

@@ -8,6 +8,7 @@ the same programs and must see the batch's folder under the same path.
 import contextlib
 import platform
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,9 +31,8 @@ _AHEAD = 2
 _PLUGIN = "dmpcli-"
 
 
-@contextlib.contextmanager
-def workers(address: str) -> Iterator[Draw]:
-    """Lend what draws parts on a cluster.
+def workers(address: str) -> AbstractContextManager[Draw]:
+    """Return what lends, within it, what draws parts on a cluster.
 
     Parameters
     ----------
@@ -55,6 +55,11 @@ def workers(address: str) -> Iterator[Draw]:
             "check address and network"
         ) from None
 
+    return _connected(client, address)
+
+
+@contextlib.contextmanager
+def _connected(client: Any, address: str) -> Iterator[Draw]:
     def draw(job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
         yield from _drawn(client, address, job, parts)
 

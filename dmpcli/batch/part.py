@@ -326,7 +326,7 @@ def _draw_sites(job: Job, prepare: Prepare, part: Part) -> Outcome:
     """Draw a part whose pairs lie on surfaces of their own, one surface after the other."""
     assert part.site is not None
     settled: dict[int, Settled] = {}
-    ready: list[Prepared] = []
+    facts: dict[bool, dict[str, Any]] = {}
     outcomes = []
     for number, site in enumerate(part.sites):
         at = np.flatnonzero(part.site == number)
@@ -340,7 +340,9 @@ def _draw_sites(job: Job, prepare: Prepare, part: Part) -> Outcome:
             refused = isinstance(error, RefusedError)
             outcomes.append(Outcome(part.number, failed, {}, 0, fatal=job.stop, refused=refused))
             continue
-        ready.append(one)
+        # Only what is said of it: its surface is let go before the next one is read.
+        if len(one.against) < len(one.pairs):
+            facts.setdefault(one.turned, _facts_of(one))
         if one.against:
             failed = {int(rows[i]): said for i, said in one.against.items()}
             refused = bool(one.refused[min(one.against)])
@@ -356,10 +358,11 @@ def _draw_sites(job: Job, prepare: Prepare, part: Part) -> Outcome:
             settled |= dict(zip(at[good].tolist(), some, strict=True))
         outcomes.append(replace(outcome, placed=_placed(one, rows)))
     outcome = _joined(outcomes, [site.hashes() for site in part.sites])
-    if not ready:
+    if not facts:
         return outcome
-    facts = job.provenance.facts | _facts_of(ready)
-    provenance = replace(job.provenance, facts=facts)
+    # Turned over is what all strokes of a part are, or none is said to be.
+    said = facts.get(False) or facts[True]
+    provenance = replace(job.provenance, facts=job.provenance.facts | said)
     return _kept(job, part, outcome, [settled[i] for i in sorted(settled)], provenance)
 
 
@@ -373,13 +376,12 @@ def _placed(one: Prepared, rows: Integers) -> dict[int, list[float]]:
     return {row: place + (one.normal or []) for row, place in zip(rows.tolist(), ends, strict=True)}
 
 
-def _facts_of(ready: Sequence[Prepared]) -> dict[str, Any]:
-    """What the strokes of a part say of their skill: turned over where all of them are."""
-    task = ready[0].task
-    over = all(one.turned for one in ready if len(one.against) < len(one.pairs))
-    skill = task.skill.turned_over() if over else task.skill
-    style = task.style
-    return trajectory.facts_of(skill, style, style.heights_over if over else style.heights)
+def _facts_of(one: Prepared) -> dict[str, Any]:
+    """What strokes say of their skill: turned over where all of them are."""
+    skill, style = one.task.skill, one.task.style
+    if one.turned:
+        return trajectory.facts_of(skill.turned_over(), style, style.heights_over)
+    return trajectory.facts_of(skill, style, style.heights)
 
 
 def _joined(outcomes: Sequence[Outcome], hashes: list[list[str | None]]) -> Outcome:

@@ -92,6 +92,7 @@ def command(
     from dmpcli.workflows.generalize_inputs import one_pair
 
     batch_options.check(wanted, given, pairs is not None)
+    _check_orientations(pairs, (start_orientation, goal_orientation))
     _check_destination(output, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import process_pool
@@ -108,7 +109,7 @@ def command(
             table, sha256 = pair_file.read(source), source.sha256
     # A table may name surfaces itself, or some of them.
     named = surface or (pairs if table is not None and table.places is not None else None)
-    _check_together(pairs, (start_orientation, goal_orientation), named, given)
+    _check_together(named, given)
     process.check(settings, given, named, keep_out)
     surface_input.check_options(named, surface_pose, surface_unit)
     _check_frame(place.in_, named, reproduce)
@@ -116,9 +117,11 @@ def command(
     if reproduce:
         start, goal = tuple(learned.frame.start), tuple(learned.frame.goal)
     sites = table is not None and table.places is not None
+    batch_options.check_surfaces(wanted, given, sites, named is not None)
     read = None
     if surface is not None and not sites:
-        read = surface_input.read(surface, surface_pose, surface_unit, summary=True)
+        store = surface_input.store_in(wanted.surface_cache)
+        read = surface_input.read(surface, surface_pose, surface_unit, True, store)
     inputs: list[dict[str, str]] = []
     if table is None:
         assert start is not None
@@ -167,18 +170,19 @@ def command(
     batches.write(ready_of(table), output, wanted)
 
 
-def _check_together(
-    pairs: Path | None,
-    orientations: tuple[Point | None, Point | None],
-    surface: Path | None,
-    given: Given,
+def _check_orientations(
+    pairs: Path | None, orientations: tuple[Point | None, Point | None]
 ) -> None:
-    """Refuse options that say nothing without one another, or say it twice."""
+    """Refuse orientations of one pair where a table names those of many."""
     if pairs is not None and any(orientations):
         raise InputError(
             "--pairs names the orientations (rx0 ry0 rz0, rxg ryg rzg); leave "
             "--start-orientation and --goal-orientation out"
         )
+
+
+def _check_together(surface: Path | None, given: Given) -> None:
+    """Refuse options that say nothing without a surface."""
     alone = [f"--{name}" for name in ("contact", "offset") if name in given]
     if surface is None and alone:
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")

@@ -36,7 +36,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     form: RecordingOptions,
 ) -> None:
-    """Say what a file is: schema, columns, units, ranges, provenance; and how fit reads it."""
+    """Say what a file is: schema, columns, units, ranges, provenance; how fit reads it."""
     on_terminal(quiet=False)
     from dmpcli.records import file_io
     from dmpcli.reporting import inspection

@@ -29,8 +29,9 @@ class ContactPolicy:
     contact : float
         N; less is no contact.
     reach : float
-        How far off the plan the surface is looked for, before the stroke to both sides and where
-        contact is lost towards the work, mm.
+        How far off the plan's start the surface is looked for, to both sides, mm.
+    again : float
+        How far it is looked for towards the work where contact is lost, mm.
     seek : float
         Guarded speed of looking for it, mm/s.
     free : float
@@ -65,13 +66,14 @@ class ContactPolicy:
     setpoint: float
     contact: float = 0.5
     reach: float = 6.0
+    again: float = 6.0
     seek: float = 2.0
     free: float = 10.0
     clamp: float = 15.0
     rate: float = 10.0
     limit: float = 2.0
-    drag: float = 3.0
-    rub: float = 0.6
+    drag: float = 2.0
+    rub: float = 0.4
     patience: float = 0.06
     on_loss: OnContactLoss = "seek"
     delay: float = 0.05

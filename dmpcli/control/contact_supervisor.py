@@ -304,13 +304,13 @@ class ContactSupervisor:
                 self._landing = Landing(wanted, self._speed, free, lag, T, self._felt[1:])
                 self.law = sinking(self.law, self._speed, self._period)
             return
-        lowest = max(self._lost_at - policy.reach, -policy.clamp) if again else -policy.reach
+        lowest = max(self._lost_at - policy.again, -policy.clamp) if again else -policy.reach
         if self.law.e <= lowest + 1e-9:
             if again:
                 self.fail(
                     t,
                     "lost",
-                    f"contact was lost and not found again within {policy.reach:g} mm: the part "
+                    f"contact was lost and not found again within {policy.again:g} mm: the part "
                     "ends there, or falls away",
                 )
             else:

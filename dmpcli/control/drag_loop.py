@@ -12,6 +12,7 @@ from dmpcli.admittance.compensation import Compensation, LowPass, dead_band
 from dmpcli.admittance.model import DragState, brake, move
 from dmpcli.arrays import Floats
 from dmpcli.control import guards, ownership
+from dmpcli.control.chatter import ChatterDetector, damped
 from dmpcli.control.cycle import (
     ControlLoop,
     Cycle,
@@ -58,11 +59,17 @@ class HandForce:
     tool : Tool
         With its zero.
     settings : RecordSettings
+
+    Attributes
+    ----------
+    felt : array, shape (6,)
+        The newest one before the dead-band.
     """
 
     def __init__(self, sensing: Sensing, tool: Tool, settings: RecordSettings) -> None:
         self._sensing, self._settings = sensing, settings
         self._compensate = Compensation(tool)
+        self.felt = np.zeros(6)
         self._low_pass = LowPass(settings.low_pass, settings.sensor_rate)
         self._wrench = np.zeros(6)
 
@@ -74,7 +81,7 @@ class HandForce:
         for sample in self._sensing.hear(now):
             external = self._compensate(sample.wrench, state.rotation)
             guards.check_wrench(external, force, torque)
-            felt = self._low_pass(external)
+            felt = self.felt = self._low_pass(external)
             self._wrench = dead_band(felt, s.dead_band_force, s.dead_band_torque)
         return self._wrench if self._sensing.fresh(now) else None
 
@@ -105,6 +112,8 @@ class Recorder(ControlLoop):
         Read once a cycle; what it returns brakes the tool and is what the recording ends with.
     remark : callable, optional
         Told, before anything moves, what is odd about the instruments.
+    noticed : callable, optional
+        Told, while it records, what is odd about the drag; it must not wait.
     shared : bool
         Whether others could move the arm: then it must stand still when it is taken, unless a hand
         leads it.
@@ -115,6 +124,7 @@ class Recorder(ControlLoop):
         It is there whatever goes wrong.
     sensor_info : SensorInfo
         What the sensor said of itself, once `run` has opened it.
+    chatter : ChatterDetector
     """
 
     def __init__(
@@ -132,6 +142,7 @@ class Recorder(ControlLoop):
         hindrance: Callable[[], DmpError | None] = lambda: None,
         remark: Callable[[str], None] = lambda _: None,
         shared: bool = False,
+        noticed: Callable[[str], None] = lambda _: None,
     ) -> None:
         watch = StopLimits(
             settings.following_error,
@@ -147,7 +158,8 @@ class Recorder(ControlLoop):
         self._interruption = interruption or Interruption()
         self._lead_in, self._remark, self._shared = lead_in, remark, shared
         self._law, self._bounds = settings.law, settings.bounds
-        self._ended = ""
+        self._ended, self._noticed = "", noticed
+        self.chatter = ChatterDetector(settings.law.period)
         self.log = DemonstrationLog(referred=led)
 
     def run(self) -> LoopOutcome:
@@ -233,6 +245,8 @@ class Recorder(ControlLoop):
             raise StoppedAtOnce("stopped at once at the second signal")
         if self._reference is None or self._home is None:
             return cycle.state.position, cycle.state.rotation
+        if cycle.wrench is not None:
+            self._listen(cycle)
         if cycle.wrench is None or self._ended:
             reference = brake(self._law, self._reference, self._bounds)
         else:
@@ -240,6 +254,13 @@ class Recorder(ControlLoop):
         self._reference = reference
         guards.check_setpoint(reference.position, reference.rotation, self._workspace)
         return reference.position, reference.rotation
+
+    def _listen(self, cycle: Cycle) -> None:
+        """Make the drag heavier along the tool where it chatters on the work."""
+        axis = cycle.state.rotation[:, 2]
+        if self.chatter.feel(cycle.state.t - self._begin, self._hand.felt[:3], axis):
+            self._law = damped(self._law, axis)
+            self._noticed(self.chatter.said())
 
     def _record(self, cycle: Cycle, setpoint: Led | None, lateness: float | None) -> None:  # noqa: ARG002
         if self._ended or lateness is None:

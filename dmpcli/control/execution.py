@@ -35,6 +35,8 @@ from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
+AGAIN = 6.0
+"""How far a surface is looked for where contact is lost, mm: deeper lies another part."""
 # A zero is taken over this time, s.
 ZERO_TIME = 0.5
 
@@ -263,6 +265,7 @@ def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: floa
         # A set-point near or below it would count as no contact.
         min(settings.coupling_contact, setpoint / 2.0),
         settings.reach,
+        min(AGAIN, settings.reach),
         settings.coupling_seek,
         settings.coupling_release,
         settings.clamp,

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -45,8 +46,14 @@ class RunView:
         period: float,
         share: Callable[[float], float | None] = lambda _: None,
     ) -> None:
-        self._title, self._rows, self._period, self._share = title, rows, period, share
+        self._title, self._rows, self.period, self._share = title, rows, period, share
         self._worst, self._seen = 0.0, 0
+
+    @property
+    def last_clock(self) -> float | None:
+        """When the last row's state was read, s, on the loop's clock; None while there is none."""
+        count = len(self._rows)
+        return float(self._rows.numbers("clock", count - 1)[0]) if count else None
 
     def now(self) -> dict[str, Any] | None:
         """Return the picture of the last row; None while there is none."""
@@ -78,7 +85,7 @@ class RunView:
             late = self._rows.numbers("lateness", self._seen)
         else:
             late = np.abs(np.diff(self._rows.numbers("clock", max(self._seen - 1, 0))))
-            late = np.maximum(late - self._period, 0.0)
+            late = np.maximum(late - self.period, 0.0)
         self._seen = last + 1
         if not len(late):
             return {}
@@ -152,8 +159,20 @@ class _Publisher(threading.Thread):
 
     def run(self) -> None:
         """Look, and wait."""
-        while not self._over.wait(EVERY):
+        while not self._over.wait(self._pause()):
             self._look({})
+
+    def _pause(self) -> float:
+        """Return how long to wait, s: to look half-way between two deadlines disturbs neither.
+
+        Else a look every so many cycles would, at some phase, meet each of their wakings.
+        """
+        last = self._view.last_clock
+        if last is None:
+            return EVERY
+        period = self._view.period
+        phase = (time.monotonic() + EVERY - last) % period
+        return EVERY + 0.5 * period - phase
 
     def close(self, reason: str) -> None:
         """Look once more, and no more; may be called twice."""

@@ -4,6 +4,7 @@ Format: mcap.dev/spec; schemas ``ros2msg``, messages ``cdr``.
 """
 
 import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -11,7 +12,8 @@ from dmpcli import extras
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats import ros_messages
-from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.formats.motion import Motion
+from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.formats.ros_messages import MessageReader
 from dmpcli.records import untrusted
 from dmpcli.version import __version__
@@ -20,6 +22,9 @@ MAGIC = b"\x89MCAP0\r\n"
 
 LARGEST_RECORD = 512 << 20
 """Bytes of one record or chunk."""
+
+_RECORD_HEAD = 9
+"""Bytes of a record's kind and length."""
 
 
 def encode(motion: Motion) -> bytes:
@@ -48,7 +53,7 @@ def encode(motion: Motion) -> bytes:
     return sink.getvalue()
 
 
-def read(path: Path, name: str, body: str | None = None) -> tuple[MotionStroke, list[str]]:
+def read(path: Path, name: str, body: str | None = None) -> tuple[PoseBlocks, list[str]]:
     """Read the poses of a file, one chunk at a time.
 
     Parameters
@@ -68,7 +73,7 @@ def read(path: Path, name: str, body: str | None = None) -> tuple[MotionStroke, 
         return decode(stream, name, body)
 
 
-def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[MotionStroke, list[str]]:
+def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[PoseBlocks, list[str]]:
     """Read the poses of an open file; see `read`."""
     (reading,) = extras.load(ROS, name, "mcap.reader")
     found = MessageReader(name, body)
@@ -80,8 +85,7 @@ def decode(stream: IO[bytes], name: str, body: str | None) -> tuple[MotionStroke
 def _take(reading: Any, stream: IO[bytes], name: str, found: MessageReader) -> None:
     stores: dict[str, Any] = {}
     reader = reading.SeekingReader(stream, record_size_limit=LARGEST_RECORD)
-    wanted = _wanted(reader.get_summary())
-    for schema, channel, message in reader.iter_messages(topics=wanted, log_time_order=False):
+    for schema, channel, message in _messages(reader, stream, name):
         kind = _full(schema.name) if schema is not None else ""
         if kind not in ros_messages.READ:
             continue
@@ -96,6 +100,35 @@ def _take(reading: Any, stream: IO[bytes], name: str, found: MessageReader) -> N
         store = stores[encoding]
         decode_ = store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
         found.take(channel.topic, kind, decode_(message.data, kind))
+
+
+def _messages(reader: Any, stream: IO[bytes], name: str) -> Iterator[tuple[Any, Any, Any]]:
+    """Yield schema, channel and message, in the file's order, one chunk at a time.
+
+    The library's own way holds the messages of all chunks before it gives the first.
+    """
+    summary = reader.get_summary()
+    wanted = _wanted(summary)
+    if summary is None or not summary.chunk_indexes:
+        yield from reader.iter_messages(topics=wanted, log_time_order=False)
+        return
+    (data_stream, records, stream_reader) = extras.load(
+        ROS, name, "mcap.data_stream", "mcap.records", "mcap.stream_reader"
+    )
+    channels, schemas = summary.channels, summary.schemas
+    for index in sorted(summary.chunk_indexes, key=lambda one: int(one.chunk_start_offset)):
+        topics = [channels[number].topic for number in index.message_index_offsets]
+        if wanted is not None and topics and not set(topics) & set(wanted):
+            continue
+        for size in (index.chunk_length, index.uncompressed_size):
+            untrusted.judge_size(name, size, LARGEST_RECORD, "one chunk")
+        stream.seek(index.chunk_start_offset + _RECORD_HEAD)
+        chunk = records.Chunk.read(data_stream.ReadDataStream(stream))
+        for one in stream_reader.breakup_chunk(chunk):
+            if isinstance(one, records.Message):
+                channel = channels[one.channel_id]
+                if wanted is None or channel.topic in wanted:
+                    yield schemas.get(channel.schema_id), channel, one
 
 
 def _wanted(summary: Any) -> list[str] | None:

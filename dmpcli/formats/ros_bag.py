@@ -10,7 +10,8 @@ from dmpcli import extras
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
 from dmpcli.formats import ros_messages
-from dmpcli.formats.motion import Motion, MotionStroke
+from dmpcli.formats.motion import Motion
+from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.formats.ros_messages import MessageReader
 from dmpcli.records import untrusted
 
@@ -59,7 +60,7 @@ def write(motion: Motion, folder: Path) -> None:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def read(folder: Path, body: str | None = None) -> tuple[MotionStroke, list[str]]:
+def read(folder: Path, body: str | None = None) -> tuple[PoseBlocks, list[str]]:
     """Read the poses of a bag.
 
     Parameters

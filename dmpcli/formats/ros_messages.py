@@ -6,21 +6,19 @@ TransformStamped, TFMessage and WrenchStamped come in. Quaternions are x, y, z, 
 
 import functools
 import re
-from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dmpcli import extras
-from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.extras import ROS
+from dmpcli.formats import pose_series
 from dmpcli.formats.motion import Motion, MotionStroke
-from dmpcli.records.columns import LARGEST
-from dmpcli.records.rotation_forms import wrong
-from dmpcli.spatial.rotations import from_quaternion, to_quaternion
+from dmpcli.formats.pose_series import PoseBlocks, Series
+from dmpcli.spatial.rotations import to_quaternion
 
 FRAME = "base"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -133,19 +131,6 @@ def _wrench(types: Any, header: Any, row: list[float]) -> Any:
     return types[WRENCH](header, both)
 
 
-@dataclass
-class _Series:
-    """What one topic or frame holds: stamps in ns, and so many numbers a row."""
-
-    width: int
-    frame: str = ""
-    stamps: "array[int]" = field(default_factory=lambda: array("q"))
-    values: "array[float]" = field(default_factory=lambda: array("d"))
-
-    def table(self) -> Floats:
-        return np.frombuffer(self.values, dtype=float).reshape(-1, self.width)
-
-
 class MessageReader:
     """Takes messages one by one, and says what stroke they are.
 
@@ -159,8 +144,8 @@ class MessageReader:
 
     def __init__(self, name: str, body: str | None = None) -> None:
         self._name, self._body = name, body
-        self._poses: dict[str, _Series] = {}
-        self._wrenches: dict[str, _Series] = {}
+        self._poses: dict[str, Series] = {}
+        self._wrenches: dict[str, Series] = {}
 
     def take(self, topic: str, type_: str, message: Any) -> None:
         """Take one message."""
@@ -175,31 +160,31 @@ class MessageReader:
             inner = message.pose.pose
             self._add(topic, message.header, inner.position, inner.orientation)
         elif type_ == WRENCH:
-            series = self._series(self._wrenches, topic, 6, message.header)
-            for vector in (message.wrench.force, message.wrench.torque):
-                series.values.extend((vector.x, vector.y, vector.z))
+            force, torque = message.wrench.force, message.wrench.torque
+            row = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
+            self._take_row(self._wrenches, topic, message.header, row)
 
     def _transform(self, name: str, one: Any) -> None:
         self._add(name, one.header, one.transform.translation, one.transform.rotation)
 
     def _add(self, name: str, header: Any, p: Any, q: Any) -> None:
         if self._body is not None and name.strip("/") != self._body.strip("/"):
-            self._poses.setdefault(name, _Series(7))  # only to know that it is there
+            self._poses.setdefault(name, Series(pose_series.POSE))  # only that it is there
             return
-        series = self._series(self._poses, name, 7, header)
-        series.values.extend((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        self._take_row(self._poses, name, header, (p.x, p.y, p.z, q.x, q.y, q.z, q.w))
 
-    def _series(self, known: dict[str, _Series], name: str, width: int, header: Any) -> _Series:
+    def _take_row(
+        self, known: dict[str, Series], name: str, header: Any, row: tuple[float, ...]
+    ) -> None:
         series = known.get(name)
         if series is None or not series.stamps:
-            series = known[name] = _Series(width, header.frame_id)
+            series = known[name] = Series(len(row), header.frame_id)
         if len(series.stamps) >= MOST:
             raise InputError(f"{self._name}: topic {name!r} holds more than {MOST} messages")
         stamp = header.stamp
-        series.stamps.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
-        return series
+        series.add(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec), row)
 
-    def stroke(self) -> tuple[MotionStroke, list[str]]:
+    def stroke(self) -> tuple[PoseBlocks, list[str]]:
         """Return the stroke, and how it was read.
 
         Raises
@@ -208,23 +193,15 @@ class MessageReader:
             There are no poses, several series of them, or a row that is none; names it.
         """
         name, series = self._chosen()
-        stamps = np.frombuffer(series.stamps, dtype=np.int64)
-        values = series.table()
-        self._check(name, stamps, values)
-        order = np.argsort(stamps, kind="stable")
-        keep = order[np.concatenate([[True], np.diff(stamps[order]) > 0])]
+        self._check(name, series)
         told = [f"poses of {name!r} in frame {series.frame!r}, m"]
-        if len(keep) < len(stamps):
-            told.append(f"{len(stamps) - len(keep)} messages repeated a stamp: the first is kept")
-        # From 0 where stamps count from an epoch; ours count from the stroke's beginning.
-        first = int(stamps[keep[0]])
-        t = (stamps[keep] - (first if first > 1_000_000 * 1_000_000_000 else 0)) * 1e-9
-        q = values[keep, 3:]
-        R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-        felt = self._felt(series.frame, stamps[keep], told)
-        return MotionStroke(t, values[keep, :3] * 1000.0, R, wrench=felt), told
+        felt: list[str] = []
+        found = PoseBlocks(series, self._felt(series, felt))
+        if found.repeated:
+            told.append(f"{found.repeated} messages repeated a stamp: the first is kept")
+        return found, told + felt
 
-    def _chosen(self) -> tuple[str, _Series]:
+    def _chosen(self) -> tuple[str, Series]:
         full = {name: series for name, series in self._poses.items() if series.stamps}
         if len(full) == 1:
             [only] = full.items()
@@ -241,37 +218,34 @@ class MessageReader:
             )
         raise InputError(f"{self._name}: several have poses: {names}; choose one with --body NAME")
 
-    def _check(self, name: str, stamps: Any, values: Floats) -> None:
-        if len(stamps) < 2:
-            raise InputError(f"{self._name}: topic {name!r} holds {len(stamps)} pose, no stroke")
-        bad = ~(np.abs(values) <= LARGEST).all(axis=1)
-        if bad.any():
-            row = int(np.argmax(bad)) + 1
+    def _check(self, name: str, series: Series) -> None:
+        if len(series.stamps) < 2:
             raise InputError(
-                f"{self._name}: topic {name!r}, message {row}: holds a value that is not a number, "
-                f"or beyond {LARGEST:g}"
+                f"{self._name}: topic {name!r} holds {len(series.stamps)} pose, no stroke"
             )
-        fault = wrong("quaternion", values[:, 3:])
+        fault = series.judged()
         if fault is not None:
             raise InputError(f"{self._name}: topic {name!r}, message {fault[0] + 1}: {fault[1]}")
 
-    def _felt(self, frame: str, stamps: Any, told: list[str]) -> Floats | None:
-        """Wrench at the poses' stamps; None where there is none in their axes over their time."""
+    def _felt(self, poses: Series, told: list[str]) -> Series | None:
+        """Wrenches in the poses' axes over all of their time; None where there are none."""
+        stamps = np.frombuffer(poses.stamps, dtype=np.int64)
+        first, last = int(stamps.min()), int(stamps.max())
         for name, series in self._wrenches.items():
-            values, own = series.table(), np.frombuffer(series.stamps, dtype=np.int64)
-            if series.frame != frame:
+            own = np.frombuffer(series.stamps, dtype=np.int64)
+            if series.frame != poses.frame:
                 told.append(
-                    f"wrench of {name!r} is not read: its frame is {series.frame!r}, not {frame!r}"
+                    f"wrench of {name!r} is not read: its frame is {series.frame!r}, not "
+                    f"{poses.frame!r}"
                 )
                 continue
-            if len(own) < 2 or not (np.abs(values) <= LARGEST).all() or (np.diff(own) < 0).any():
+            if len(own) < 2 or series.judged() is not None or (np.diff(own) < 0).any():
                 continue
-            if own[0] > stamps[0] or own[-1] < stamps[-1]:
+            if own[0] > first or own[-1] < last:
                 told.append(
                     f"wrench of {name!r} is not read: it does not last as long as the poses"
                 )
                 continue
-            at, since = (stamps - own[0]) * 1e-9, (own - own[0]) * 1e-9
             told.append(f"wrench of {name!r}")
-            return np.column_stack([np.interp(at, since, column) for column in values.T])
+            return series
         return None

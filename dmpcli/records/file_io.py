@@ -10,7 +10,7 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -165,15 +165,31 @@ def write(path: str | Path, content: bytes) -> None:
     InputError
         The output cannot be written (no space, no right).
     """
-    if str(path) == DASH:
-        say(content)
+    write_by(path, lambda stream: stream.write(content))
+
+
+def write_by(path: str | Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Write one output whole, or not at all, by a function that fills an open file.
+
+    Raises
+    ------
+    InputError
+        The output cannot be written (no space, no right).
+    """
+    special = str(path) != DASH and Path(path).exists() and not Path(path).is_file()
+    if str(path) == DASH or special:
+        whole = io.BytesIO()
+        if special:
+            check_writable(path)
+        fill(whole)
+        if special:
+            _write_special(_meant(path), whole.getvalue())
+        else:
+            say(whole.getvalue())
         return
     check_writable(path)
     file = _meant(path)
-    if file.exists() and not file.is_file():
-        _write_special(file, content)
-        return
-    with _written(path, file, content) as temporary:
+    with _written(path, file, fill) as temporary:
         temporary.replace(file)
 
 
@@ -199,7 +215,7 @@ def write_new(path: str | Path, content: bytes) -> Path:
     if file.exists() and not file.is_file():
         _write_special(file, content)
         return file
-    with _written(path, file, content) as temporary:
+    with _written(path, file, lambda stream: stream.write(content)) as temporary:
         for number in itertools.count(1):
             try:
                 _link(temporary, file)
@@ -233,13 +249,13 @@ def temporary_of(file: Path) -> tuple[Path, BinaryIO]:
 
 
 @contextlib.contextmanager
-def _written(path: str | Path, file: Path, content: bytes) -> Iterator[Path]:
+def _written(path: str | Path, file: Path, fill: Callable[[BinaryIO], object]) -> Iterator[Path]:
     """Write a temporary file whole, for the caller to name; what is left of it goes."""
     temporary: Path | None = None
     try:
         temporary, stream = temporary_of(file)
         with stream:
-            stream.write(content)
+            fill(stream)
             stream.flush()
             os.fsync(stream.fileno())
         yield temporary

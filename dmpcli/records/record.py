@@ -1,8 +1,9 @@
 """A record: one Parquet file between the stages, its columns as arrays and its provenance."""
 
+import contextlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -170,6 +171,27 @@ class GrowingRecord:
         """Write what a file ends with."""
         if self._writer is not None:
             self._writer.close()
+
+
+def store_groups(records: Iterable[Record], sink: Any, form: Form | None = None) -> None:
+    """Write rows that come in groups, each a record of its own, as one Parquet file.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        At least one, of the same columns and provenance.
+    sink : file
+        Open Arrow or Python file.
+    form : Form, optional
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    with contextlib.closing(GrowingRecord(sink, form)) as growing:
+        for one in records:
+            growing.add(one)
 
 
 def _arrow_table(record: Record, form: Form) -> tuple[Any, dict[str, Any]]:

@@ -43,7 +43,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
         A value is no time; names the row.
     """
     if nanoseconds is not None:
-        t = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
+        t: Floats = seconds(table, column, unit) + table.numbers(nanoseconds) * 1e-9
         t -= t[0]
         return t
     values: Any = table.columns.get(column)
@@ -56,7 +56,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
             return exact
     t = table.numbers(column) * TIME[unit]
     if len(t) and abs(t[0]) > EPOCH:
-        t -= t[0]
+        t = t - t[0]
     return t
 
 

@@ -101,6 +101,8 @@ class Table:
     def floats(self, column: str) -> Floats:
         """Return a column as numbers, shape (rows,): NaN where there is text or no value.
 
+        It may be the table's own: copy what is to be changed.
+
         Raises
         ------
         InputError
@@ -112,7 +114,7 @@ class Table:
             )
         values = self.columns[column]
         if isinstance(values, np.ndarray):
-            return values.astype(float)
+            return np.asarray(values, dtype=float)
         return _floats(values, self.decimal)
 
     def texts(self, column: str) -> list[str]:

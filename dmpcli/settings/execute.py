@@ -128,10 +128,10 @@ class ExecuteSettings(Settings):
     coupling_rate: Positive = 10.0
     coupling_limit: Annotated[float, Ge(1.2), Le(100)] = 2.0
     # What is more across the normal than drag + rub times the normal force is a wall.
-    coupling_drag: Positive = 3.0
-    coupling_rub: Annotated[float, Ge(0), Le(100)] = 0.6
+    coupling_drag: Positive = 2.0
+    coupling_rub: Annotated[float, Ge(0), Le(100)] = 0.4
     # How far off the plan's start the surface is looked for, and how fast before anything is known.
-    coupling_reach: Positive = 6.0
+    coupling_reach: Positive = 10.0
     coupling_seek: Positive = 2.0
     coupling_contact: Positive = 0.5
     coupling_patience: Positive = 0.06

@@ -202,6 +202,6 @@ def _listed(value: Any) -> Sequence[float]:
 
 def _capital(unit: str) -> str:
     """Return a unit as a metavar: rad/s² as RAD/S^2."""
-    for sign, word in {"°": "deg", "²": "^2", "³": "^3", "·": "*"}.items():
+    for sign, word in {"°": "deg", "%": "percent", "²": "^2", "³": "^3", "·": "*"}.items():
         unit = unit.replace(sign, word)
     return unit.upper()

@@ -106,6 +106,30 @@ def to_euler_continuous(R: Floats) -> Floats:
     return np.stack(_continuous(_angles(np.moveaxis(R, (-2, -1), (0, 1)))), axis=-1)
 
 
+def to_euler_continued(R: Floats, before: Floats, angles: Floats) -> Floats:
+    """Return `to_euler_continuous` of a path that goes on from an earlier part of it.
+
+    Parameters
+    ----------
+    R : array, shape (T, 3, 3)
+    before : array, shape (3, 3)
+        The last rotation of the part before.
+    angles : array, shape (3,)
+        Its angles there, rad.
+
+    Returns
+    -------
+    array, shape (T, 3)
+        rad.
+    """
+    own = to_euler_continuous(np.concatenate([before[None], R]))
+    other = np.stack([own[:, 0] + np.pi, np.pi - own[:, 1], own[:, 2] + np.pi], axis=1)
+    far = [np.abs(_wrapped(each[0] - angles)).sum() for each in (own, other)]
+    same = own if far[0] <= far[1] else other
+    found: Floats = same + 2 * np.pi * np.rint((angles - same[0]) / (2 * np.pi))
+    return found[1:]
+
+
 def euler_of_products(C: Floats, M: Floats) -> Floats:
     """Return `to_euler_continuous` of the paths C_b M(t), several times faster.
 
@@ -327,11 +351,21 @@ def from_quaternion(q: Floats) -> Floats:
     if q.ndim == 2 and len(q) > _IN_CACHE:
         whole: Floats = np.empty((len(q), 3, 3))
         for first in range(0, len(q), _IN_CACHE):
-            whole[first : first + _IN_CACHE] = from_quaternion(q[first : first + _IN_CACHE])
+            part = slice(first, first + _IN_CACHE)
+            _from_quaternion(q[part], whole[part])
         return whole
+    return _from_quaternion(q, np.empty((*q.shape[:-1], 3, 3)))
+
+
+def _from_quaternion(q: Floats, R: Floats) -> Floats:
+    """Fill R with 1 + 2 (w K + K K)."""
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     K = skew(q[..., :3])
-    R: Floats = np.eye(3) + 2.0 * (q[..., 3, None, None] * K + K @ K)
+    np.matmul(K, K, out=R)
+    K *= q[..., 3, None, None]
+    R += K
+    R *= 2.0
+    R += np.eye(3)
     return R
 
 

@@ -41,7 +41,7 @@ from dmpcli.workflows.run_output import (
     interruptible,
     refuse_replacing,
 )
-from dmpcli.workflows.told_later import ContactTeller
+from dmpcli.workflows.told_later import LaterTeller
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
-    teller = ContactTeller(realtime and request.presses and keeper is not None)
+    teller = LaterTeller(realtime and request.presses and keeper is not None)
     try:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
@@ -302,7 +302,7 @@ def _loop(
     tool_file: Source | None,
     keeper: RunOutput,
     batch: StrokeSelection,
-    teller: ContactTeller,
+    teller: LaterTeller,
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
@@ -314,7 +314,7 @@ def _loop(
         if coupling is not None:
             policy = execution.policy_of(batch, settings, arm.info.lookahead)
         touch = execution.touch(
-            bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller
+            bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )
     watch = execution.watch(settings)
     kind: type[PlanLoop] = ServoLoop

@@ -45,7 +45,7 @@ from dmpcli.workflows.generalize import (
 )
 from dmpcli.workflows.generalize_inputs import facing_tool, in_base, reach_of, style_of
 from dmpcli.workflows.generalize_messages import mark, tell_of_stretch, tell_of_surface
-from dmpcli.workflows.surface_input import SurfaceInput, placed_input
+from dmpcli.workflows.surface_input import SurfaceInput, placed_input, store_in
 
 _POSE = "column 'pose'"
 
@@ -121,7 +121,7 @@ def prepared_sites(
         order.on_border,
         order.keep_out,
         reach,
-        SurfaceReader(MeshStore(_text(cache))),
+        SurfaceReader(store_in(cache)),
     )
     return Ready(
         Task(skill.plain(), None, settings.style(), reach, asked_events(settings)),
@@ -133,10 +133,6 @@ def prepared_sites(
         sites,
         work,
     )
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path.absolute())
 
 
 def _said_pose(given: str) -> list[float] | str:

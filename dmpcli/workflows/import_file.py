@@ -1,7 +1,8 @@
 """`import`: recordings, drawings and programs of others in, demonstrations out."""
 
+import functools
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from dmpcli.errors import InputError, counted
 from dmpcli.formats import detect
 from dmpcli.formats.motion import MotionStroke
+from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.messages import tell
 from dmpcli.records import file_io, record, schemas, suffixes
 from dmpcli.records.file_io import Source
@@ -19,7 +21,7 @@ from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
 from dmpcli.settings.import_file import ImportOptions
-from dmpcli.spatial.rotations import interpolate, to_euler_continuous
+from dmpcli.spatial.rotations import interpolate, to_euler_continued, to_euler_continuous
 from dmpcli.workflows.recording import whole
 
 NAME, ID = "{name}", "{id}"
@@ -86,7 +88,7 @@ def import_file(
             f"NAME, or put {ID} into the name of the output for a file of each"
         )
     for one in strokes:
-        if one.events:
+        if isinstance(one, MotionStroke) and one.events:
             tell(f"{name}: {_switched(one)}")
     said: dict[str, Any] = {"format": kind}
     if form is not None:
@@ -94,34 +96,19 @@ def import_file(
     if kind != TABLE:
         said |= {k: v for k, v in options.as_options().items() if k in _OPTIONS[kind]}
     for one in strokes:
-        _check_place(one, name)
         place = output
         if output.name != file_io.DASH:
             own = output.name.replace(NAME, stem_of(file)).replace(ID, _safe(one.id))
             place = output.with_name(own)
-        file_io.write(place, record.encode(demonstration(one, inputs, said)))
+        groups = demonstrations(one, inputs, said, name)
+        file_io.write_by(place, functools.partial(record.store_groups, groups))
         shown = file_io.shown(place, output=True)
         tell(f"{shown}: {counted(len(one), 'sample')}, {one.duration:.3f} s, from {kind}")
 
 
-def _check_place(one: MotionStroke, name: str) -> None:
-    """Refuse a stroke that no reader of demonstrations would take.
-
-    Raises
-    ------
-    InputError
-    """
-    beyond = ~(np.abs(one.position) <= FARTHEST).all(axis=1)
-    if beyond.any():
-        raise InputError(
-            f"{name}: stroke {one.id}, sample {int(np.argmax(beyond)) + 1}: the position is beyond "
-            f"{FARTHEST:g} mm; check the units that its program wrote"
-        )
-
-
 def _read(
     file: Path, options: ImportOptions, form: Layout | None, given: Mapping[str, Any]
-) -> tuple[str, list[MotionStroke], list[dict[str, str]]]:
+) -> tuple[str, Sequence[MotionStroke | PoseBlocks], list[dict[str, str]]]:
     """Return a file's kind, its strokes, and the entries of `Provenance.inputs`."""
     episode = None if form is None else form.episode
     kind = None if str(file) == file_io.DASH else detect.kind_of_path(file)
@@ -152,7 +139,7 @@ _STREAMED = ("mcap", "ros2", "lerobot")
 
 def _streamed(
     file: Path, kind: str, form: Layout | None, episode: str | None
-) -> tuple[MotionStroke, list[str]]:
+) -> tuple[MotionStroke | PoseBlocks, list[str]]:
     """Read what is not read whole."""
     body = None if form is None else form.body
     if kind == "lerobot":
@@ -307,19 +294,52 @@ def sampled(one: MotionStroke, rate: float, name: str) -> MotionStroke:
     return replace(one, t=t, position=position, rotation=R)
 
 
-def demonstration(
-    one: MotionStroke, inputs: Sequence[dict[str, str]], options: dict[str, Any]
-) -> Record:
-    """Return the record of a stroke that came in."""
-    columns: dict[str, Any] = {"t": np.asarray(one.t, dtype=float)}
-    columns |= dict(zip(POSITION, np.asarray(one.position, dtype=float).T, strict=True))
-    if one.rotation is not None:
-        angles = to_euler_continuous(np.asarray(one.rotation))
-        columns |= dict(zip(EULER_ANGLES, angles.T, strict=True))
-    if one.wrench is not None:
-        columns |= dict(zip(WRENCH, one.wrench.T, strict=True))
+def demonstrations(
+    one: MotionStroke | PoseBlocks,
+    inputs: Sequence[dict[str, str]],
+    options: dict[str, Any],
+    name: str,
+) -> Iterator[Record]:
+    """Yield the record of a stroke that came in, some rows at a time.
+
+    Parameters
+    ----------
+    one : MotionStroke or PoseBlocks
+    inputs : sequence of dict
+        Entries of `Provenance.inputs`.
+    options : dict
+    name : str
+        Of the file it came from.
+
+    Raises
+    ------
+    InputError
+        A place that no reader of demonstrations would take.
+    """
     origin = Provenance("import", options, tuple(inputs))
-    return Record(schemas.DEMONSTRATION, columns, origin)
+    count, last = 0, None
+    for part in (one,) if isinstance(one, MotionStroke) else one.blocks():
+        _check_place(part, name, count)
+        columns: dict[str, Any] = {"t": np.asarray(part.t, dtype=float)}
+        columns |= dict(zip(POSITION, np.asarray(part.position, dtype=float).T, strict=True))
+        if part.rotation is not None:
+            R = np.asarray(part.rotation)
+            angles = to_euler_continuous(R) if last is None else to_euler_continued(R, *last)
+            last = R[-1], angles[-1]
+            columns |= dict(zip(EULER_ANGLES, angles.T, strict=True))
+        if part.wrench is not None:
+            columns |= dict(zip(WRENCH, part.wrench.T, strict=True))
+        yield Record(schemas.DEMONSTRATION, columns, origin)
+        count += len(part)
+
+
+def _check_place(part: MotionStroke, name: str, before: int) -> None:
+    beyond = ~(np.abs(part.position) <= FARTHEST).all(axis=1)
+    if beyond.any():
+        raise InputError(
+            f"{name}: stroke {part.id}, sample {before + int(np.argmax(beyond)) + 1}: the position "
+            f"is beyond {FARTHEST:g} mm; check the units that its program wrote"
+        )
 
 
 def _switched(one: MotionStroke) -> str:

@@ -1,6 +1,7 @@
 """`record`: one stroke that a hand drags the tool along, on the mock or on real instruments."""
 
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from dmpcli.workflows.run_output import (
     interruptible,
     refuse_replacing,
 )
+from dmpcli.workflows.told_later import LaterTeller
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,11 @@ def record(
     tutored = None if bench.lab is None else stroke
     provenance = provenance_of(settings, options, bench.simulated, tool_source, tutored)
     # Entered until the file is there: a signal meanwhile must not cost the recording.
-    with ownership.ArmLock(addresses[0]) as lock, interruptible(realtime) as signals:
+    with (
+        ownership.ArmLock(addresses[0]) as lock,
+        interruptible(realtime) as signals,
+        closing(LaterTeller(realtime)) as teller,
+    ):
         recorder = Recorder(
             watched(bench.robot) if realtime else bench.robot,
             bench.sensor,
@@ -130,6 +136,7 @@ def record(
             keeper.hindrance,
             warn,
             lock.shared,
+            teller.say,
         )
         if settings.workspace is None:
             tell(f"stays within {ROOM:g} mm of the start in x, y and z; --workspace says otherwise")
@@ -212,6 +219,8 @@ def _recording(
     """Return the recording; how punctual it was is a fact only where a clock ran."""
     facts = known.facts | {"ended": outcome.reason} | (recorder.timing.facts() if realtime else {})
     facts |= recorder.stop_outcome.facts()
+    if recorder.chatter.alarms:
+        facts["chatter"] = recorder.chatter.alarms
     if recorder.sensor_info.virtual:
         facts["simulated"] = True
     return Record(DEMONSTRATION, recorder.log.columns(), replace(known, facts=facts))

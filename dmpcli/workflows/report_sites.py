@@ -12,11 +12,11 @@ from dmpcli.errors import InputError
 from dmpcli.messages import heard
 from dmpcli.records import dataset, file_io, pairs
 from dmpcli.records.learning_record import surface_key
-from dmpcli.records.mesh_store import MeshStore
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.workflows.generalize_sites import Otherwise, SurfaceReader, sites_of
+from dmpcli.workflows.surface_input import store_in
 
 
 class SiteGrounds:
@@ -51,7 +51,7 @@ class SiteGrounds:
         self._sites = found.sites
         self._of: dict[str, int] = dict(zip(table.ids, found.of.tolist(), strict=True))
         self._status = dict(zip(table.ids, table.status, strict=True))
-        self._reader = SurfaceReader(MeshStore(None if cache is None else str(cache.absolute())))
+        self._reader = SurfaceReader(store_in(cache))
         self._hashes: dict[str, str] = {}
         self._lock = threading.Lock()
 

@@ -84,7 +84,13 @@ def check_options(surface: Path | None, pose: str | None, unit: str | None) -> N
         raise InputError("--surface-pose and --surface-unit say where a --surface lies; name one")
 
 
-def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) -> SurfaceInput:
+def read(
+    path: Path,
+    pose: str | None,
+    unit: str | None,
+    summary: bool = False,
+    store: "MeshStore | None" = None,
+) -> SurfaceInput:
     """Read a surface, place it in the base frame, and say what is odd about it.
 
     Parameters
@@ -97,6 +103,8 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
         Of a mesh file's lengths; without it mm.
     summary : bool
         Also say how fine a mesh is: its facets bound every accuracy.
+    store : MeshStore, optional
+        Where prepared meshes are kept.
 
     Raises
     ------
@@ -113,7 +121,14 @@ def read(path: Path, pose: str | None, unit: str | None, summary: bool = False) 
     waiting = mesh_file.waiting(source)
     if waiting is not None:
         tell(waiting)
-    return placed_input(source, pose, placed, unit, summary=summary)
+    return placed_input(source, pose, placed, unit, store=store, summary=summary)
+
+
+def store_in(folder: Path | None) -> "MeshStore":
+    """Return what reads surfaces, and keeps prepared meshes in a folder where one is named."""
+    from dmpcli.records.mesh_store import MeshStore
+
+    return MeshStore(None if folder is None else str(folder.absolute()))
 
 
 def placed_input(

@@ -9,8 +9,8 @@ from dmpcli.messages import warn
 _TOLD = ("lost", "too hard", "oscillating")
 
 
-class ContactTeller:
-    """Tells the troubles of a contact as they happen: at once, or from a thread of its own.
+class LaterTeller:
+    """Warns at once, or from a thread of its own.
 
     Parameters
     ----------
@@ -25,14 +25,17 @@ class ContactTeller:
             self._thread = threading.Thread(target=self._tell, daemon=True)
             self._thread.start()
 
-    def __call__(self, event: ContactEvent) -> None:
-        """Tell an event if a person should know of it now."""
-        if event.state not in _TOLD and not event.detail.startswith("saturated"):
-            return
+    def say(self, text: str) -> None:
+        """Warn of something."""
         if self._queue is None:
-            warn(str(event))
+            warn(text)
         else:
-            self._queue.put(str(event))
+            self._queue.put(text)
+
+    def contact(self, event: ContactEvent) -> None:
+        """Tell how a contact has changed, if a person should know of it now."""
+        if event.state in _TOLD or event.detail.startswith("saturated"):
+            self.say(str(event))
 
     def close(self) -> None:
         """Wait, shortly, until all is told."""

@@ -511,10 +511,10 @@ def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_pa
     out = tmp_path / "run.parquet"
     options = ("--coupling", "force", "--force-setpoint", 5, "--robot", "mock:?plate=none")
     result = execute(traj, "-o", out, *options, expect=3)
-    assert "no contact within 6 mm" in result.stderr
+    assert "no contact within 10 mm" in result.stderr
     run = run_of(out)
     assert set(run.columns["phase"]) <= {"approach", "stop"}
-    assert run.columns["coupling"].min() == pytest.approx(-6.0, abs=0.1)
+    assert run.columns["coupling"].min() == pytest.approx(-10.0, abs=0.1)
     assert "lost" in set(run.columns["contact"])
     assert run.provenance.facts["contact_events"][-1]["state"] == "lost"
 

@@ -258,6 +258,23 @@ def test_unknown_columns_are_told_once(shop, drawn, tmp_path):
     assert told.count("'colour': no such column is known") == 1
 
 
+def test_options_of_surfaces_say_something(shop, tmp_path):
+    flat = tmp_path / "flat.csv"
+    flat.write_text("x0,y0,z0,xg,yg,zg\n0,0,0,90,0,0\n")
+    told = draw(shop, tmp_path / "b", flat, code=2)
+    assert "--surfaces-per-part: the table names no surfaces" in told
+    words = ["generalize", shop / "s.json", "-o", tmp_path / "b", "--pairs", flat]
+    told = dmpcli(*words, "--surface-cache", tmp_path / "kept", code=2).stderr
+    assert "--surface-cache: there is no surface to keep" in told
+    part = ["--surface", shop / "job" / "parts" / "p0.stl", "--snap-tol", 20]
+    dmpcli(*words, *part)
+    plain = content(tmp_path / "b")
+    for _ in range(2):
+        dmpcli(*words, *part, "--surface-cache", tmp_path / "kept")
+        assert content(tmp_path / "b") == plain
+    assert len(list((tmp_path / "kept").iterdir())) == 1
+
+
 @pytest.mark.slow
 def test_report_holds_each_stroke_against_its_own_surface(shop, drawn, tmp_path):
     words = [drawn[1], "--pairs", drawn[0], "--json"]

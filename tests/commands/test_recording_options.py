@@ -104,8 +104,12 @@ def test_inspect_names_the_option_that_reads_a_table(tmp_path):
         ("ur.csv", UR, "--layout ur"),
         ("no_header.csv", table("", T, *XYZ.T), "--columns t,x,y,z"),
         ("no_time.csv", table("x,y,z", *XYZ.T), "--sample-rate HZ"),
-        ("units.csv", table("t [s],x [m],y [m],z [m]", T, *METRES.T), "reads it as it is."),
-        ("comma.csv", PLAIN.replace(",", ";").replace(".", ","), "reads it as it is, if lengths"),
+        ("units.csv", table("t [s],x [m],y [m],z [m]", T, *METRES.T), "-o skill.json"),
+        (
+            "comma.csv",
+            PLAIN.replace(",", ";").replace(".", ","),
+            "commas between digits read as decimal signs",
+        ),
     ):
         (tmp_path / name).write_text(text)
         done = run("inspect", tmp_path / name)

@@ -53,5 +53,6 @@ def test_the_plate_lies_under_a_stroke_that_begins_with_a_lifted_pen():
     )
     lab = execution.scene(stroke, presses=True, height=8.0)
     assert lab.plate.point == pytest.approx(foot)
+    assert lab.plate.normal == pytest.approx(normal)
     assert lab.position == pytest.approx(position[0])
     assert execution.scene(stroke, presses=True).plate.point == pytest.approx(position[0])

@@ -292,6 +292,7 @@ def test_strokes_of_differing_length_teach_the_paper_the_stroke_of_their_mean_le
     size = np.abs(alone.skill.weights).max()
     np.testing.assert_allclose(both.skill.weights, alone.skill.weights, atol=1e-6 * size)
     assert both.skill.goal[0] == pytest.approx(120.0, abs=1e-3)
+    assert both.lost == 0.0  # it knows of no noise that smoothing could have gone beyond
     # Each is shown in the length in which it was drawn.
     for reproduction, length in zip(both.reproductions, (100.0, 140.0), strict=True):
         assert np.ptp(reproduction.demonstrated[:, 0]) == pytest.approx(length, abs=0.01)

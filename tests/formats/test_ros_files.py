@@ -1,5 +1,6 @@
 """MCAP and ROS 2 bags: what other readers find in ours, and ours in theirs."""
 
+import functools
 import io
 import struct
 
@@ -25,7 +26,8 @@ def felt():
 
 
 def read(content, body=None):
-    return mcap_file.decode(io.BytesIO(content), "a.mcap", body)
+    blocks, told = mcap_file.decode(io.BytesIO(content), "a.mcap", body)
+    return blocks.whole(), told
 
 
 def same(read, one):
@@ -45,7 +47,7 @@ def test_mcap_comes_back_to_1e_9_with_its_wrench():
 def test_a_bag_comes_back_to_1e_9_with_its_wrench(tmp_path):
     one = felt()
     ros_bag.write(motion(one), tmp_path / "bag")
-    back, _ = ros_bag.read(tmp_path / "bag")
+    back = ros_bag.read(tmp_path / "bag")[0].whole()
     same(back, one)
     np.testing.assert_allclose(back.wrench, one.wrench, atol=1e-12)
     ros_bag.write(motion(wave(samples=9)), tmp_path / "bag")  # replaced
@@ -165,17 +167,18 @@ def test_odometry_and_tf_of_others_are_read(tmp_path, plugin):
     bag_of_others(tmp_path / "bag", rows.tolist(), plugin=plugin)
     with pytest.raises(InputError, match="several have poses: /odom, tool0"):
         ros_bag.read(tmp_path / "bag")
-    back, told = ros_bag.read(tmp_path / "bag", "odom")
+    blocks, told = ros_bag.read(tmp_path / "bag", "odom")
+    back = blocks.whole()
     np.testing.assert_allclose(back.t, np.arange(50) * 0.02, atol=1e-12)
     np.testing.assert_allclose(back.position, one.position, atol=1e-9)
     assert angle_between(back.rotation, one.rotation).max() < 1e-9
     assert back.wrench is None
     assert "its frame is 'sensor', not 'map'" in told[1]
-    back, _ = ros_bag.read(tmp_path / "bag", "tool0")
+    back = ros_bag.read(tmp_path / "bag", "tool0")[0].whole()
     np.testing.assert_allclose(back.position, one.position + [1000, 0, 0], atol=1e-9)
     if plugin == "MCAP":
         [file] = (tmp_path / "bag").glob("*.mcap")
-        back, _ = mcap_file.read(file, "a.mcap", "tool0")
+        back = mcap_file.read(file, "a.mcap", "tool0")[0].whole()
         np.testing.assert_allclose(back.position, one.position + [1000, 0, 0], atol=1e-9)
 
 
@@ -225,3 +228,26 @@ def test_metadata_nested_without_end_are_refused_before_they_are_parsed(tmp_path
     path.write_text(path.read_text().replace("custom_data:", f"custom_data: {'[' * 50_000}"))
     with pytest.raises(InputError, match="nested too deep"):
         ros_bag.read(tmp_path / "bag")
+
+
+def test_messages_come_chunk_by_chunk_and_not_all_at_once(monkeypatch):
+    from mcap import stream_reader, writer
+
+    from dmpcli.formats.ros_messages import MessageReader
+
+    small = functools.partial(writer.Writer, chunk_size=400)
+    monkeypatch.setattr(writer, "Writer", lambda sink, chunk_size: small(sink))
+    content = mcap_file.encode(motion(wave(samples=60)))
+    opened, seen = [], []
+    broken, take = stream_reader.breakup_chunk, MessageReader.take
+    monkeypatch.setattr(
+        stream_reader, "breakup_chunk", lambda chunk: opened.append(1) or broken(chunk)
+    )
+    monkeypatch.setattr(
+        MessageReader, "take", lambda *given: seen.append(len(opened)) or take(*given)
+    )
+    back, _ = read(content)
+    same(back, wave(samples=60))
+    assert len(opened) > 10
+    assert seen[0] <= 2
+    assert max(np.diff(seen)) <= 2

@@ -108,11 +108,15 @@ def test_derivatives_of_a_known_motion():
 
 def test_derivatives_of_a_known_turn_are_about_base_axes():
     """0.8 rad about base z, minimum jerk in 10 s: 1.875, 5.7735 and 60 times the closed forms."""
-    velocity, acceleration, jerk = plan(stroke(turn=0.8)).derivatives()
+    # Tilted, since a pen that points straight down is its own inverse.
+    tilted = rotations.exp(np.array([0.3, 0.2, 0.0]))
+    source = stroke(turn=0.8)
+    source = type(source)("0", source.t, source.position, source.rotation @ tilted)
+    velocity, acceleration, jerk = plan(source).derivatives()
     at = np.argmax(velocity[:, 1, 2] ** 2)
     assert abs(velocity[at, 1, 2]) == pytest.approx(1.875 * 0.08, rel=1e-3)
     # The pen points down: its own z axis is base -z, and it turns about that.
-    turned = rotations.log(stroke(turn=0.8).rotation[-1] @ PEN_DOWN.T)
+    turned = rotations.log(source.rotation[-1] @ source.rotation[0].T)
     assert np.sign(velocity[at, 1, 2]) == np.sign(turned[2])
     assert velocity[:, 1].sum(axis=0) * 0.02 == pytest.approx(turned, abs=1e-9)
     assert np.abs(acceleration[:, 1]).max() == pytest.approx(5.7735 * 0.008, rel=1e-2)

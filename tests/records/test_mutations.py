@@ -3,6 +3,7 @@
 import ctypes
 import json
 import os
+import signal
 import warnings
 
 import pytest
@@ -120,15 +121,22 @@ def test_a_process_that_dies_is_told_by_its_mutation_and_the_rest_goes_on(deed, 
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"planted-{n}" for n in bad)
 
 
-def test_a_process_that_hangs_outside_of_python_is_ended(monkeypatch):
-    monkeypatch.setattr(worker, "DEAF", 0.5)
+def block():
+    read, _ = os.pipe()
+    os.read(read, 1)
+
+
+def spin():
+    signal.signal(signal.SIGPROF, signal.SIG_IGN)
+    while True:
+        json.dumps({})
+
+
+@pytest.mark.parametrize(("deed", "limit"), [(block, "STILL"), (spin, "DEAF")])
+def test_a_process_that_hears_no_alarm_is_ended(monkeypatch, deed, limit):
+    monkeypatch.setattr(worker, limit, 0.5)
     count = suffering(400)[0] + 1
-
-    def block():
-        read, _ = os.pipe()
-        os.read(read, 1)
-
-    [found] = runs(harmful(block), Asked(count, 3), jobs=1)
+    [found] = runs(harmful(deed), Asked(count, 3), jobs=1)
     [line] = found.held
     assert "no alarm heard" in line
     assert found.count == count

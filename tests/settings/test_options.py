@@ -93,7 +93,7 @@ def test_help_states_unit_and_default_of_every_option(command, one):
     if one.shown_default:
         assert found.help.endswith(f"[default: {one.shown_default}]")
     if one.option.unit and one.base is float:
-        assert one.metavar.isupper()
+        assert one.metavar == one.metavar.upper()
     elif one.option.unit:
         assert one.shown_default.endswith(f" {one.option.unit}")
 

@@ -103,3 +103,18 @@ def test_many_quaternions_are_the_same_bits_as_each_alone() -> None:
     alone = np.stack([rotations.from_quaternion(one) for one in q[8_180:8_210]])
     np.testing.assert_array_equal(R[8_180:8_210], alone)
     np.testing.assert_array_equal(R, rotations.from_quaternion(q[None])[0])
+
+
+@pytest.mark.parametrize("size", [1, 7, 50, 1000])
+def test_angles_go_on_from_part_to_part_as_along_the_whole_path(size: int) -> None:
+    s = np.linspace(0.0, 1.0, 300)
+    # Past straight down and through ry = 90 degrees, with full turns on the way.
+    turned = np.column_stack([np.pi + 9 * s, 4 * s, 15 * s])
+    R = Rotation.from_euler("XYZ", turned).as_matrix()
+    angles = [rotations.to_euler_continuous(R[:size])]
+    for first in range(size, len(R), size):
+        part = R[first : first + size]
+        angles.append(rotations.to_euler_continued(part, R[first - 1], angles[-1][-1]))
+    joined = np.concatenate(angles)
+    np.testing.assert_allclose(joined, rotations.to_euler_continuous(R), atol=1e-12)
+    np.testing.assert_allclose(joined, turned, atol=1e-9)

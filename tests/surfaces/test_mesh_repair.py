@@ -104,6 +104,19 @@ def test_a_t_junction_is_stitched_at_the_vertices_on_the_edge_in_their_order():
     assert (as_trimesh(found).face_normals[:, 2] > 0.999).all()
 
 
+def test_t_junctions_of_several_edges_are_counted_together():
+    V, F = grid(4)
+    wide = np.array([[0, 1, 3], [0, 3, 2]])
+    far = np.array([[0.0, 40.0, 0.0], [40.0, 40.0, 0.0], [0.0, 60.0, 0.0], [40.0, 60.0, 0.0]])
+    near = far * [1.0, -1.0, 1.0] + [0.0, 40.0, 0.0]
+    parts = [V, far, near]
+    faces = [F, wide + len(V), wide[:, ::-1] + len(V) + 4]
+    found = mended(np.concatenate(parts), np.concatenate(faces))
+    assert "6 T-junctions stitched" in found.remarks
+    assert borders(found.F) == (8 + 2 * 3, 1)
+    assert as_trimesh(found).area == pytest.approx(40.0 * 80.0)
+
+
 @pytest.mark.parametrize(("share", "outward"), [(0.3, 1.0), (0.7, -1.0)])
 def test_faces_that_look_the_other_way_are_turned_as_most_of_the_part_looks(share, outward):
     V, F = ball()
@@ -179,7 +192,7 @@ def test_two_boxes_that_touch_along_an_edge_stay_two_and_are_open_along_it():
     ("fault", "words"),
     [
         ("index", r"^face 4 names vertex 163, but there are 162"),
-        ("negative", r"^face 4 names vertex -2, but"),
+        ("negative", r"^face 4 names vertex 0, but"),
         ("nan", r"^face \d+ has a vertex at \(nan, .* no place \(1 such vertex\)"),
         ("huge", r"reach 4e\+07 mm; check the unit"),
         ("none", "holds no faces"),
@@ -192,7 +205,7 @@ def test_what_cannot_be_mended_is_refused_by_place(fault, words):
         case "index":
             F[3, 1] = len(V)
         case "negative":
-            F[3, 1] = -3
+            F[3, 1] = -1
         case "nan":
             V[11, 0] = np.nan
         case "huge":

@@ -160,3 +160,15 @@ def test_the_charts_of_some_pairs_are_theirs(closed):
         assert (charts.lengths > 0.0).all()
         assert charts.goals[:, 2] == pytest.approx(0.0, abs=1e-9)
         assert charts.lengths == pytest.approx(np.linalg.norm(goal - start, axis=1))
+
+
+def test_a_stroke_is_closed_by_its_first_and_last_sample_alone():
+    square = np.array([[0.0, 0, 0], [30, 0, 0], [30, 40, 0], [0, 40, 0], [0, 0, 0]])
+    assert plane.extent(square) == 50.0
+    assert plane.is_closed(square)
+    assert not plane.is_closed(square[:-1])
+    # A thing of shares of the extent.
+    for gap, closed in ((0.99 * plane.CLOSED, True), (1.01 * plane.CLOSED, False)):
+        ended = square.copy()
+        ended[-1, 0] = 50.0 * gap
+        assert plane.is_closed(ended) == closed

@@ -78,6 +78,12 @@ def test_what_is_loaded_at_once_is_judged_by_the_tests_that_use_it(tmp_path, mon
     assert choice.stages(of[6], known, 0.25) == [[a]]
 
 
+def test_nothing_of_the_repository_may_be_loaded_before_a_mutant():
+    """These tests are, here."""
+    with pytest.raises(RuntimeError, match="loaded before any mutant: tests"):
+        reach.load([])
+
+
 MODULE = '''
 """What a test looks at and what none does."""
 

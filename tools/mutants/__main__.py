@@ -27,7 +27,7 @@ from typing import Any
 from tools.mutants import choice, operators, reach, trial
 
 ROOMS = ("dmp", "admittance", "surfaces", "metrics", "planning", "control")
-OTHERS = ("records", "reporting", "calibration", "batch")
+OTHERS = ("records", "reporting", "calibration")
 """Rooms whose tests judge too: they call the six in their own process."""
 
 OUT = Path("out/mutants")

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import coverage
@@ -59,7 +60,7 @@ def measure(tests: str, rooms: list[Path], kept: Path) -> int:
         }
         for file in sorted(data.measured_files())
     }
-    modules = sorted(m for m in sys.modules if m.split(".")[0] not in ("dmpcli", "tests", "tools"))
+    modules = sorted(name for name, module in sys.modules.items() if not _here(module))
     kept.parent.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps({"seconds": watch.seconds, "lines": lines, "modules": modules}))
     return 0
@@ -96,8 +97,21 @@ def read(kept: list[Path]) -> Reach:
     return reach
 
 
+def _here(module: ModuleType) -> bool:
+    """Tell what lies in this repository: it, or what it loads, is what mutants are put into."""
+    file = str(getattr(module, "__file__", None) or "")
+    # The environment may stand in the repository's folder.
+    return file.startswith(f"{Path.cwd()}/") and not file.startswith(f"{sys.prefix}/")
+
+
 def load(modules: list[str]) -> None:
-    """Load what the tests load of others, so that forked judges have it."""
+    """Load what the tests load of others, so that forked judges have it.
+
+    Raises
+    ------
+    RuntimeError
+        Something of the repository itself was loaded with it: no mutant of that would be seen.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name in modules:
@@ -106,3 +120,6 @@ def load(modules: list[str]) -> None:
                     __import__(name)
                 except Exception:
                     continue  # one that only its own program can load
+    loaded = [n for n, m in sys.modules.items() if _here(m) and not n.startswith("tools")]
+    if loaded := [name for name in loaded if name != "__main__" and name != "__mp_main__"]:
+        raise RuntimeError(f"loaded before any mutant: {', '.join(loaded[:5])}")
