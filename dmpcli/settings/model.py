@@ -17,6 +17,9 @@ from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origi
 
 from annotated_types import Ge, Gt, Le, Lt
 
+_LONGEST = 60
+"""Letters of a metavar: more leave no room for the text in a line of help."""
+
 
 @dataclass(frozen=True)
 class Option:
@@ -111,7 +114,10 @@ class Setting:
 
     @property
     def metavar(self) -> str | None:
-        """The form of the value: its unit, its choices, or what it names; None for a switch."""
+        """The form of the value: its unit, its choices, or what it names; None for a switch.
+
+        Choices too many for a line of help stand in its text, which is wrapped.
+        """
         said = "" if self.option is None else self.option.metavar
         if self.base is bool:
             return None
@@ -120,7 +126,17 @@ class Setting:
             form = {int: "INTEGER", float: "NUMBER", Path: "FILE"}.get(part, "")
             unit = self.option.unit if self.option and part is float else ""
             forms.append(said or _capital(unit) or form)
-        return "|".join(form for form in forms if form) or "NAME"
+        form = "|".join(form for form in forms if form) or "NAME"
+        return form if len(form) <= _LONGEST else self.name.rstrip("_").upper()
+
+    @property
+    def help(self) -> str:
+        """What it is for, and its choices where they stand nowhere else."""
+        assert self.option is not None
+        listed = self.metavar is None or all(word in self.metavar for word in self.choices)
+        return (
+            self.option.help if listed else f"{self.option.help} One of {', '.join(self.choices)}."
+        )
 
     @property
     def shown_default(self) -> str:

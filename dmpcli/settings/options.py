@@ -143,7 +143,7 @@ def _typed(setting: Setting) -> tuple[Any, Any]:
     made = typer.Option(
         flag,
         metavar=setting.metavar,
-        help=f"{option.help}  [default: {default}]" if default else option.help,
+        help=f"{setting.help}  [default: {default}]" if default else setting.help,
         show_default=False,
         autocompletion=choice(*setting.choices) if setting.choices else None,
     )
