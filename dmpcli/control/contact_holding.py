@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 from dmpcli.admittance.force_law import LawState, advance, by_rule
 from dmpcli.admittance.oscillation import AlternationDetector
 from dmpcli.control.contact_course import ContactCourse
+from dmpcli.control.contact_policy import MetWall
 
 # How near the force must stay to its set-point, as a share of it, and for so long, s.
 NEAR, NEAR_TIME = 0.1, 0.1
@@ -102,9 +104,10 @@ class HeldForce(ContactCourse):
         self._swings.reset()
         self._become(before, t)
 
-    def _guard(self, t: float, force: float, across: float, wanted: float) -> None:
+    def _guard(self, t: float, force: float, across: float, wanted: float, speed: float) -> None:
         """Stop at once at a force that the tool must not meet."""
         policy = self.policy
+        self._sides.append(across)
         most = policy.limit * max(wanted, 2.0 * policy.contact)
         if self.state == "landing" and not self._settled:
             most *= _LANDING
@@ -119,11 +122,18 @@ class HeldForce(ContactCourse):
                 urgent=True,
             )
         elif across > policy.drag + policy.rub * max(force, 0.0):
+            said = ""
+            sides = list(self._sides)
+            rise = max((b - a for a, b in pairwise(sides)), default=0.0) / self._period
+            if rise > 0.0 and speed > 0.0:
+                reaction = self._known_delay + self._period
+                self.wall = MetWall(across, speed, rise / speed, reaction)
+                said = f" ({self.wall})"
             self.fail(
                 t,
                 "too hard",
                 f"{across:.1f} N across the normal beside {force:.1f} N along it: the tool has met "
-                "a wall or an edge",
+                f"a wall or an edge{said}",
                 urgent=True,
             )
 
