@@ -26,7 +26,7 @@ def lines(file: SkillFile) -> list[str]:
     force = file.force_profile
     if force is not None:
         said.append(
-            f"force along the normal, {force.start:.2f} N at the start, {force.goal:.2f} at the goal: "
+            f"force along the normal from {force.start:.2f} N to {force.goal:.2f} N at the ends: "
             f"given back with RMS {force.rms:.3g} N, largest {force.largest:.3g} N"
         )
     if file.spread is not None:
