@@ -62,9 +62,10 @@ setup: $(VENV)/installed
 
 # Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
 # what they share is made once. Lint and types are looked at meanwhile: some tests wait in real time,
-# and mypy is one process.
+# and mypy is one process. For the same reason there are two processes to a core; WORKERS=N chooses.
 
-PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+WORKERS ?= $(shell expr 2 \* $$(getconf _NPROCESSORS_ONLN))
+PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/installed
 	@mkdir -p $(OUT)

@@ -51,11 +51,15 @@ def _columns(schema: schemas.Schema) -> dict[str, Any]:
         if column.type == "string":
             alike = name == "id" and schema is not schemas.PAIRS
             found[name] = np.array([str(i // 12 if alike else i) for i in range(n)], dtype=object)
+            if name == schemas.EVENT:
+                found[name] = np.array(["on DO1 +0.005", None] * (n // 2), dtype=object)
         elif column.type == "int64":
             found[name] = np.arange(1, n + 1)
         else:
             found[name] = 0.1 * np.sin(_T + i)
     found["t"] = np.concatenate([_T[: n // 2], _T[: n // 2]]) if "id" in found else _T
+    if "fn" in found:
+        found["fn"] = np.abs(found["fn"])
     if "nx" in found:
         found |= {"nx": 0.0 * _T, "ny": 0.0 * _T, "nz": 1.0 + 0.0 * _T}
     return found

@@ -114,4 +114,5 @@ def advance(gains: ForceGains, state: LawState, error: float, fastest: float) ->
         speed = math.copysign(fastest, speed)
         if error * speed > 0.0:
             integral = state.integral
-    return LawState(state.e + speed * T, speed, integral, saturated)  # eq. (3)
+    # eq. (3); its e is e(X) of eq. (10)
+    return LawState(state.e + speed * T, speed, integral, saturated)

@@ -8,6 +8,7 @@ from typer.core import TyperCommand
 from dmpcli.commands.examples import EXAMPLES
 
 NARROWEST = 80
+_LONGEST = 60
 
 
 def width() -> int:
@@ -22,6 +23,7 @@ class HelpedCommand(TyperCommand):
         super().__init__(*words, **said)
         for option in self.params:
             _state_default(option)
+            _list_choices(option)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words; who asks for the settings alone need not name files."""
@@ -41,6 +43,14 @@ class HelpedCommand(TyperCommand):
             for one in examples:
                 for line in (f"# {one.words}", *one.line.split("\n")):
                     formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
+
+
+def _list_choices(option: Any) -> None:
+    """Name choices that would not fit into a line in the text, which is wrapped."""
+    metavar = getattr(option, "metavar", None) or ""
+    if len(metavar) > _LONGEST and "|" in metavar:
+        option.metavar = option.name.upper()
+        option.help = f"One of {', '.join(metavar.split('|'))}: {option.help}"
 
 
 def _state_default(option: Any) -> None:

@@ -209,7 +209,7 @@ def test_a_small_gap_is_bridged_smoothly(traj, tmp_path):
         (("--max-jerk", "inf"), "--max-jerk"),
         (("--workspace", 0, -1, 0, 1, 0, 1), "workspace"),
         (("--robot", "elite://10.0.0.1?look=1"), "look: there is no such option; elite has"),
-        (("--robot", "alien://10.0.0.1"), "no such instrument; a robot is one of mock:, elite://"),
+        (("--robot", "alien://10.0.0.1"), "no such instrument; a robot is one of mock:,"),
         (("--robot", "nonsense"), "nonsense"),
         (("--force-setpoint", 5), "--coupling force"),
         (("--coupling", "force", "--force-setpoint", 50), "is not below --max-force"),

@@ -125,7 +125,7 @@ def test_a_csv_and_a_tool_file_stand_in_the_provenance_by_their_hash(tmp_path):
         (["--preset", "heavy"], InputError, "--preset heavy: no such preset"),
         (["--tool", "none.json"], InputError, "none.json: no such file"),
         (["--robot", "elite://10.0.0.1"], InputError, "beside a mock sensor"),
-        (["--robot", "ur://h", "--sensor", "laser://h"], InputError, "one of mock:, netft://"),
+        (["--robot", "ur://h", "--sensor", "laser://h"], InputError, "one of mock:,"),
         (["--robot", "mock:?estop_at=0"], RefusedError, "emergency stop"),
         (["--sensor", "mock:?silent_at=0"], InstrumentError, "sends nothing"),
     ],

@@ -135,7 +135,7 @@ def watched(tmp_path, *words, interrupt=None):
 
 @pytest.mark.slow
 def test_a_person_at_the_terminal_sees_the_run_and_every_message(tmp_path):
-    written(tmp_path / "traj.parquet", columns(duration=2.0))
+    written(tmp_path / "traj.parquet", columns(duration=10.0))
     words = ["execute", "traj.parquet", "-o", "run.parquet", "--realtime"]
     # Another test may keep this computer busy.
     words += ["--robot", "mock:?lag=0.4", "--following-error", "200"]
@@ -150,7 +150,7 @@ def test_a_person_at_the_terminal_sees_the_run_and_every_message(tmp_path):
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_run_and_the_view_with_it(tmp_path):
-    written(tmp_path / "traj.parquet", columns(duration=8.0))
+    written(tmp_path / "traj.parquet", columns(duration=40.0))
     words = ["execute", "traj.parquet", "-o", "run.parquet", "--realtime"]
     words += ["--robot", "mock:?lag=0.4", "--following-error", "200"]
     text, code = watched(tmp_path, *words, interrupt=b"executing")
