@@ -1,7 +1,8 @@
 """How force is held on a true surface that is not where the plan has it: on the bench, in physics.
 
 ``python -m benchmarks.force [TABLE ...] [--seeds N] [--jobs N]``; tables: ``surfaces`` (that of
-``make reproduce-force``), ``stiffness``, ``landing``, ``features``, ``zero``; all without a name.
+``make reproduce-force``), ``stiffness``, ``landing``, ``features``, ``zero``, ``profile``; all
+without a name.
 
 The stroke is the paper's, 109 mm with a wave of 50 mm, in 12 s from rest to rest at 50 Hz, with
 5 N; an EC66 with joints that lag by 25 ms, a pen of 2 N/mm, friction 0.2, noise 0.05 N. What is
@@ -23,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 from scipy.spatial import cKDTree
 
@@ -32,6 +34,7 @@ from dmpcli.bench import options
 from dmpcli.bench.workpiece import Flat, Round
 from dmpcli.bench.world import World
 from dmpcli.control.execution import SENSOR_RATE
+from dmpcli.dmp import reference_paths
 from dmpcli.errors import DmpError
 from dmpcli.metrics.wave_height import stroke_wave
 from dmpcli.records import file_io, record, schemas
@@ -60,6 +63,8 @@ class Case:
     coupled : bool
     settings : dict
         Of ``execute``.
+    taught : bool
+        Whether it presses as it was taught, from 3 to 8 to 4 N, instead of evenly.
     """
 
     name: str
@@ -67,12 +72,35 @@ class Case:
     bench: dict[str, str] = field(default_factory=dict)
     coupled: bool = True
     settings: dict[str, Any] = field(default_factory=dict)
+    taught: bool = False
+
+
+def pressed_skill() -> dmpcli.Skill:
+    """Return the paper's stroke as taught on a plane in contact, from 3 to 8 to 4 N."""
+    t = np.linspace(0.0, 10.0, 1001)
+    rng = np.random.default_rng(1)
+    force = 0.05 * rng.standard_normal((len(t), 6))
+    push = 3.0 + t / 10.0 + 4.5 * np.sin(np.pi * t / 10.0) ** 2
+    force[:, 2] += push
+    position = reference_paths.sine(START, GOAL, 50.0, t, 10.0) - push[:, None] / PEN * UP
+    angles = np.tile([np.pi, 0.0, 0.0], (len(t), 1))
+    names = ["t", "x", "y", "z", "rx", "ry", "rz"]
+    names += [f"{name} [N]" for name in schemas.FORCE]
+    names += [f"{name} [N·m]" for name in schemas.WRENCH[3:]]
+    table = np.column_stack([t, position, angles, force])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pressed.parquet"
+        pq.write_table(pa.table(dict(zip(names, table.T, strict=True))), path)
+        return dmpcli.fit(dmpcli.read(path), normal=(0.0, 0.0, 1.0), force_profile=True)
 
 
 @lru_cache
-def planned(plan: str, offset: float) -> dmpcli.Trajectory:
+def planned(plan: str, offset: float, taught: bool = False) -> dmpcli.Trajectory:
     """Return the stroke on the surface that the plan knows, so far off it, mm."""
-    skill = dmpcli.fit(dmpcli.read(ROOT / "sample_runs" / "reference.parquet"))
+    if taught:
+        skill = pressed_skill()
+    else:
+        skill = dmpcli.fit(dmpcli.read(ROOT / "sample_runs" / "reference.parquet"))
     shapes = {
         "plane": dmpcli.Plane(MIDDLE, UP),
         # Along its highest line, so that the wave swings to both sides.
@@ -110,8 +138,10 @@ def run(work: tuple[Case, int]) -> dict[str, Any]:
     logging.disable(logging.CRITICAL)
     said = said_of(case, seed)
     pen = float(said.get("stiffness", PEN))
-    drawn = planned(case.plan, 0.0 if case.coupled else -FORCE / pen)
-    sensor = {"sensor": "bench://ec66", "coupling": "force", "force_setpoint": FORCE}
+    drawn = planned(case.plan, 0.0 if case.coupled else -FORCE / pen, case.taught)
+    sensor = {"sensor": "bench://ec66", "coupling": "force"}
+    if not case.taught:
+        sensor["force_setpoint"] = FORCE
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()):
         truth, out = Path(folder) / "truth.parquet", Path(folder) / "run.parquet"
         url = "bench://ec66?" + "&".join(f"{key}={value}" for key, value in said.items())
@@ -161,11 +191,13 @@ def measured(
     on[rows[rows < len(on)]] = True
     if not on.any():
         return found
-    felt = push[on]
+    felt, asked = push[on], FORCE
+    if case.taught:
+        asked = np.asarray(log.columns["fn"])[cycle[np.flatnonzero(on) - late]]
     found |= {
         "contact": float((felt > 0.0).mean()),
         "mean": float(felt.mean()),
-        "rms": float(np.sqrt(np.mean((felt - FORCE) ** 2))),
+        "rms": float(np.sqrt(np.mean((felt - asked) ** 2))),
         "peak": float(felt.max()),
     }
     tip = np.column_stack([true[key] for key in "xyz"])[on]
@@ -293,12 +325,22 @@ def zero() -> list[Case]:
     ]
 
 
+def profile() -> list[Case]:
+    """A force that was taught on the plane, on the plane and on the cylinder."""
+    return [
+        Case(f"{plan} {offset:+g} mm", plan, displaced(offset, about="0"), taught=True)
+        for plan in ("plane", "cylinder")
+        for offset in (0.0, -1.5)
+    ]
+
+
 TABLES = {
     "surfaces": surfaces,
     "stiffness": stiffness,
     "landing": landing,
     "features": features,
     "zero": zero,
+    "profile": profile,
 }
 
 

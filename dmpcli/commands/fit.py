@@ -57,7 +57,7 @@ def command(
     if [str(path) for path in demonstrations].count(file_io.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [file_io.read(path) for path in demonstrations]
-    strokes = [recording(source, layout) for source in sources]
+    strokes = [recording(source, layout, settings.force_profile) for source in sources]
     named = None
     if surface is not None:
         named = surface_input.read(surface, surface_pose, surface_unit, summary=True)

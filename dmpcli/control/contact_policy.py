@@ -86,6 +86,40 @@ class ContactPolicy:
 
 
 @dataclass(frozen=True)
+class MetWall:
+    """A wall or an edge that a stroke ran into, and what no loop of its delay had spared it.
+
+    Attributes
+    ----------
+    across : float
+        Force across the normal at which the stroke was ended, N.
+    speed : float
+        Of the stroke, mm/s.
+    stiffness : float
+        Of tool and wall across the normal, by how fast the force rose, N/mm.
+    reaction : float
+        From a displacement to what is done about its force, s.
+    """
+
+    across: float
+    speed: float
+    stiffness: float
+    reaction: float
+
+    @property
+    def unavoidable(self) -> float:
+        """Force that is met before anything can be done: reaction time by speed by stiffness, N."""
+        return self.reaction * self.speed * self.stiffness
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        return (
+            f"{self.across:.1f} N across the normal; {self.unavoidable:.1f} N are unavoidable at "
+            f"{self.speed:.3g} mm/s on {self.stiffness:.3g} N/mm behind {self.reaction:.2g} s"
+        )
+
+
+@dataclass(frozen=True)
 class ContactEvent:
     """One change of state.
 

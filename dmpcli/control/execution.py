@@ -333,6 +333,8 @@ def pressed(pressing: ForceTracker) -> str:
             f"; landed with {found['landing_peak']:.2f} N at the most, on {found['stiffness']:.3g} "
             f"N/mm behind {found['delay']:.2g} s"
         )
+    if pressing.supervisor.wall is not None:
+        said += f"; ended by a wall: {pressing.supervisor.wall}"
     if found["saturated"]:
         said += f"; at its limits on {100.0 * found['saturated']:.2g} % of the stroke"
     if "oscillating" in {event.state for event in pressing.supervisor.events}:

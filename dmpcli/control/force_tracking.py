@@ -1,7 +1,8 @@
 """What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -119,12 +120,18 @@ class ForceTracker:
         force = float(normal @ felt)
         off = felt - force * normal
         wanted = self.wanted(index)
-        supervisor.step(t, force, float(np.sqrt(off @ off)), wanted)
+        supervisor.step(t, force, float(np.sqrt(off @ off)), wanted, self._speed(index))
         if index > plan.lead and wanted > 0.0:
             touching = force > min(supervisor.policy.contact, wanted / 2.0)
             self.tally.add(force, wanted, touching and not supervisor.doubted, supervisor.saturated)
         self._delta = force_coupling.follow(self._filter, self._delta, supervisor.e)
         return self.hold(index)
+
+    def _speed(self, index: float) -> float:
+        """How fast the plan goes at a set-point's number, mm/s."""
+        x, at = self._plan.position, min(int(index + 1e-9), len(self._plan) - 1)
+        step = x[at] - x[max(at - 1, 0)]
+        return math.sqrt(step @ step) / self._plan.period
 
     def come(self, index: float, wrench: Floats | None, t: float) -> Floats:
         """Return what to add on the way to the stroke: it ends over the plan, by the reach.
@@ -224,6 +231,8 @@ class ForceTracker:
         if not found:
             return {"contact_events": events}
         found |= {"landing_peak": supervisor.landing_peak}
+        if supervisor.wall is not None:
+            found["wall"] = asdict(supervisor.wall) | {"unavoidable": supervisor.wall.unavoidable}
         for name in ("stiffness", "delay"):
             if getattr(supervisor, name) is not None:
                 found[name] = getattr(supervisor, name)

@@ -122,6 +122,33 @@ class Weights:
 
 
 @dataclass(frozen=True)
+class LearnedCurve:
+    """Weights of the coordinates of one curve, before anything is held against it.
+
+    Attributes
+    ----------
+    basis : Basis
+    passes : int
+        Of LWR.
+    weights : array, shape (D, N)
+    alpha_f, initial_velocity : array, shape (D,)
+    demonstrated, reproduced : array, shape (T, D)
+        At even times.
+    moved : array, shape (T, D)
+        By how much, to begin and to end as demonstrated.
+    """
+
+    basis: Basis
+    passes: int
+    weights: Floats
+    alpha_f: Floats
+    initial_velocity: Floats
+    demonstrated: Floats
+    reproduced: Floats
+    moved: Floats
+
+
+@dataclass(frozen=True)
 class Problem:
     """What is to be learned, and how.
 
@@ -154,19 +181,47 @@ class Problem:
         passes : int or None
             So many alone; None tries 1, 2, ... `PASSES` as they are asked for.
         """
-        spring, duration = self.spring, self.curve.duration
+        for way in self.ways(self.curve, count, method, passes):
+            quality = judged(way.demonstrated, way.reproduced, self.closed)
+            bulge = float(np.linalg.norm(way.moved[:, :3], axis=1).max())
+            yield Weights(
+                way.basis,
+                way.passes,
+                way.weights,
+                way.alpha_f,
+                way.initial_velocity,
+                way.demonstrated,
+                way.reproduced,
+                quality,
+                bulge,
+            )
+
+    def ways(
+        self, curve: Curve, count: int, method: Method, passes: int | None
+    ) -> Iterator["LearnedCurve"]:
+        """Learn N weights per coordinate of any curve of the same duration; as `learn`.
+
+        Parameters
+        ----------
+        curve : Curve
+            D coordinates.
+        count, method, passes
+            As in `learn`.
+        """
+        duration, axes = curve.duration, slice(0, curve.spline.c.shape[1])
+        spring = TransformationGains(self.spring.k[axes], self.spring.d[axes], self.spring.tau)
         k, d = float(spring.k[0]), float(spring.d[0])
         model = forced_model(count, k, d, spring.tau / duration, self.alpha_1, self.widths)
         regression = model.regression
         ends = np.array([0.0, duration])
-        start, goal = self.curve(ends)
-        V0, V_end = spring.tau * self.curve(ends, 1)
-        x, velocity, acceleration = self.curve.limited(count, model.samples)
+        start, goal = curve(ends)
+        V0, V_end = spring.tau * curve(ends, 1)
+        x, velocity, acceleration = curve.limited(count, model.samples)
         forcing = target_forcing(spring, goal, x, velocity, acceleration)
         # What N carries of the recording begins at another velocity than the recording.
         late = V0 - spring.tau * velocity[0]
         rest = start * model.a + goal * model.b + V0 * model.c
-        demonstrated = self.curve.even(model.samples)
+        demonstrated = curve.even(model.samples)
         C, E = model.end_responses, model.end
         required = np.stack(
             [
@@ -180,7 +235,7 @@ class Problem:
             weights = regression.fit(method, forcing, number)
             forced = model.response(weights)
             alpha_f = _alpha_f(demonstrated - rest + late * model.c, forced, demonstrated)
-            bulge = 0.0
+            by_ends = np.zeros_like(demonstrated)
             if count > 1:
                 move, moved = model.start_move
                 by = late / alpha_f
@@ -189,11 +244,9 @@ class Problem:
                 m = end_conditions.corrections(weights, required / alpha_f[:, None], C, moves)
                 weights, forced = weights + m @ moves.T, forced + changed @ m.T
                 by_ends = late * (model.c + moved[:, None]) + alpha_f * (changed @ m.T)
-                bulge = float(np.linalg.norm(by_ends[:, :3], axis=1).max())
             reproduced = rest + alpha_f * forced
-            quality = judged(demonstrated, reproduced, self.closed)
-            yield Weights(
-                model.basis, number, weights, alpha_f, V0, demonstrated, reproduced, quality, bulge
+            yield LearnedCurve(
+                model.basis, number, weights, alpha_f, V0, demonstrated, reproduced, by_ends
             )
 
 
@@ -260,7 +313,9 @@ def _alpha_f(rest: Floats, forced: Floats, demonstrated: Floats) -> Floats:
     """
     across, along = np.sum(rest * forced, axis=0), np.sum(forced**2, axis=0)
     ranges = np.ptp(demonstrated, axis=0)
-    extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
+    extents = ranges
+    if len(ranges) == 6:  # positions and angles
+        extents = np.repeat([np.linalg.norm(ranges[:3]), np.linalg.norm(ranges[3:])], 3)
     least = np.maximum(NEGLIGIBLE * extents, ROUNDING)
     told = along > least**2 * len(forced)
     return np.where(told, across / np.where(told, along, 1.0), 1.0)  # alpha_f of eq. (9)

@@ -101,14 +101,16 @@ def contact_heights(skill: Skill, contact: float | None, offset: float = 0.0) ->
     )
 
 
-def pressed(w: Floats, force: float | None, heights: ContactHeights | None) -> Floats | None:
+def pressed(
+    w: Floats, force: float | Floats | None, heights: ContactHeights | None
+) -> Floats | None:
     """Set-point of the force along the normal: a force in contact, 0 where the tool is lifted.
 
     Parameters
     ----------
     w : array, shape (T,)
         Heights as drawn, mm.
-    force : float or None
+    force : float, array of shape (T,), or None
         N; None asks for none.
     heights : ContactHeights or None
         What was drawn of them over a named surface; without one a pen within `CONTACT` of the

@@ -36,7 +36,8 @@ def moving_axes(x: Floats, noise: Noise) -> Floats:
     flat = 0
     while flat < x.shape[1] - 1:
         axis = axes[:, flat]
-        sigma = float(np.sqrt(axis @ covariance @ axis))
+        # Rounding takes the variance across the only axis that moves below 0.
+        sigma = float(np.sqrt(max(axis @ covariance @ axis, 0.0)))
         if sigma == 0.0 or not _flat(x @ axis / sigma):
             break
         flat += 1

@@ -136,7 +136,12 @@ def _drawn(
             style.inclination,
         )
     lift, count = drawn.lift, len(pairs)
-    force = pressed(shared[4], style.force, heights)
+    asked: float | Floats | None = style.force
+    if asked is None:
+        asked = skill.taught_force(when.stroke)
+        if asked is not None and heights is not None and heights.offset > 0.0:
+            asked = 0.0  # nothing presses at a stand-off
+    force = pressed(shared[4], asked, heights)
     if not _finite(drawn):
         raise InputError("the skill's numbers give no finite stroke; fit it again")
     if lift is not None:

@@ -1,6 +1,7 @@
 """Learning a skill that keeps the stroke: from any recording, within a tolerance."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from dmpcli.dmp.basis_search import (
 from dmpcli.dmp.curve import Curve, dense_count
 from dmpcli.dmp.demonstrations import ComparedPath
 from dmpcli.dmp.fit_result import Fit, ReproductionMeasures
+from dmpcli.dmp.force_profile import LEAST, ForceProfile
 from dmpcli.dmp.options import TOLERANCE, TOLERANCE_SHARE, FitOptions
 from dmpcli.dmp.paper_learning import fit_as_paper
 from dmpcli.dmp.paper_preprocessing import Prepared
@@ -41,6 +43,8 @@ _MOST_SHOWN = 8001
 _ACROSS = 2.0
 # Standard errors of that estimate that count as noise, and standard deviations of one sample.
 _DOUBT, _OUTLYING = 3.0, 4.5
+# Of a stroke whose force is learned, less than this share in contact tells none.
+_PRESSED = 0.05
 
 
 def fit(
@@ -78,7 +82,7 @@ def fit(
         return fit_as_paper(strokes, choices)
     seen = [
         preprocess(
-            stroke,
+            stroke if choices.force_profile else replace(stroke, contact_force=None),
             cutoff=choices.cutoff,
             trim=choices.trim,
             start=choices.start,
@@ -103,6 +107,7 @@ def fit(
         ridge = search(problem, "ridge", tolerance)
         alternative = (len(ridge.basis), with_lost(ridge.quality, lost).rms)
     noise = max(p.sigma for p in seen)
+    profile = _profile(found, alignment, problem, learned, choices)
     skill = _skill(
         learned,
         problem,
@@ -110,8 +115,10 @@ def fit(
         found,
         Accuracy(tolerance.length, quality.rms, quality.largest, noise, within),
         taught,
-        guessed=planes is not None and planes.guessed,
+        # A force that pushes tells the side.
+        guessed=planes is not None and planes.guessed and profile is None,
         spread=None if alignment is None else _spread(alignment),
+        force=profile,
     )
     if len(found) == 1:
         reproductions = [_reproduction(learned.demonstrated, learned.reproduced, quality)]
@@ -134,6 +141,7 @@ def _check_paper(choices: FitOptions, surface: Surface | None) -> None:
         "--cut-pauses": choices.cut_pauses,
         "passes": choices.passes is not None,
         "--align": choices.align != "path",
+        "--force-profile": choices.force_profile,
     }
     for name, asked in given.items():
         if asked:
@@ -237,6 +245,7 @@ def _skill(
     taught: TaughtSurface | None,
     guessed: bool,
     spread: DemonstrationSpread | None,
+    force: ForceProfile | None,
 ) -> Skill:
     curve, spring = problem.curve, problem.spring
     x = curve.even(_samples_of(curve))
@@ -264,6 +273,48 @@ def _skill(
         side_guessed=guessed,
         reached=reached,
         spread=spread,
+        force=force,
+    )
+
+
+def _profile(
+    found: Sequence[TaughtStroke],
+    alignment: Alignment | None,
+    problem: Problem,
+    learned: Weights,
+    choices: FitOptions,
+) -> ForceProfile | None:
+    """Learn the force along the normal with the functions of the path; None is not asked for."""
+    if not choices.force_profile:
+        return None
+    forces = []
+    for i, d in enumerate(found, start=1):
+        if d.force is None:
+            raise InputError(f"demonstration {i}: --force-profile: has no force to learn")
+        if float(np.mean(d.force > LEAST)) < _PRESSED:
+            side = ""
+            if float(np.mean(d.force < -LEAST)) >= _PRESSED:
+                side = "; it pushes to the other side: turn the normal over with --normal"
+            raise InputError(
+                f"demonstration {i}: --force-profile: the tool is pushed along the normal by more "
+                f"than {LEAST:g} N in {100.0 * float(np.mean(d.force > LEAST)):.0f} % of the "
+                f"stroke{side or '; record it in contact, with a tool file whose zero is right'}"
+            )
+        forces.append(d.force[:, None])
+    if alignment is not None:
+        forces = [track.carry(f) for track, f in zip(alignment.tracks, forces, strict=True)]
+    curve = Curve.through(np.mean(forces, axis=0), problem.curve.duration, len(forces[0]) - 1)
+    passes = None if choices.regression == "ridge" else learned.passes
+    *_, way = problem.ways(curve, len(learned.basis), choices.regression, passes)
+    error = way.reproduced - way.demonstrated
+    return ForceProfile(
+        weights=way.weights[0],
+        alpha_f=float(way.alpha_f[0]),
+        start=float(way.demonstrated[0, 0]),
+        goal=float(way.demonstrated[-1, 0]),
+        initial_velocity=float(way.initial_velocity[0]),
+        rms=float(np.sqrt(np.mean(error**2))),
+        largest=float(np.abs(error).max()),
     )
 
 

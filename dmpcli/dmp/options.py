@@ -71,6 +71,8 @@ class FitOptions:
         Part of the recordings to learn, s from their beginning.
     cut_pauses : bool
         Whether pauses are taken out.
+    force_profile : bool
+        Whether the force along the normal is learned too.
     """
 
     model: Model = "modified"
@@ -91,6 +93,7 @@ class FitOptions:
     start: float | None = None
     until: float | None = None
     cut_pauses: bool = False
+    force_profile: bool = False
 
     @property
     def as_paper(self) -> bool:

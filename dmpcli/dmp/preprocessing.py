@@ -48,6 +48,8 @@ class Preprocessed:
         Samples that were averaged away with others of their burst.
     resampled : bool
         Whether uneven steps were interpolated.
+    force : SmoothSpline or None
+        On the tool, base axes, N; None where none is to be learned.
     """
 
     raw: Trajectory
@@ -61,6 +63,7 @@ class Preprocessed:
     cut_pauses: bool
     merged: int
     resampled: bool
+    force: SmoothSpline | None = None
 
     @property
     def duration(self) -> float:
@@ -183,6 +186,10 @@ def preprocess(
         quaternion = spline_smoothing.smooth(
             q, raw.duration, noise.estimate(q), cutoff, base.resampled
         )
+    force = None
+    if raw.contact_force is not None:
+        f = raw.contact_force
+        force = spline_smoothing.smooth(f, raw.duration, noise.estimate(f), cutoff, base.resampled)
     return Preprocessed(
         raw,
         position,
@@ -195,6 +202,7 @@ def preprocess(
         cut_pauses,
         base.merged,
         base.resampled,
+        force,
     )
 
 

@@ -137,6 +137,7 @@ def cut(
         np.linspace(0.0, step * max(count - 1, 0), count),
         stroke.position[kept],
         None if stroke.rotation is None else stroke.rotation[kept],
+        contact_force=None if stroke.contact_force is None else stroke.contact_force[kept],
     )
 
 

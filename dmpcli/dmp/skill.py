@@ -9,6 +9,7 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.dmp import transformation_system
 from dmpcli.dmp.canonical_system import Basis, phase
+from dmpcli.dmp.force_profile import LEAST, ForceProfile
 from dmpcli.dmp.options import ForcingScale, Learning, Model
 from dmpcli.dmp.transformation_system import TransformationGains
 
@@ -148,6 +149,8 @@ class Skill:
         None for the paper's learning, and for skills of older files.
     spread : DemonstrationSpread or None
         None for a single demonstration.
+    force : ForceProfile or None
+        Along the normal, where it was learned; w is then 0 where it presses.
     """
 
     model: Model
@@ -173,6 +176,7 @@ class Skill:
     side_guessed: bool = False
     reached: Accuracy | None = None
     spread: DemonstrationSpread | None = None
+    force: ForceProfile | None = None
 
     @property
     def oriented(self) -> bool:
@@ -218,6 +222,24 @@ class Skill:
         f = self.basis.mean(s, self.weights)
         f *= self.forcing_factor * s[..., None]  # eq. (7)
         return f
+
+    def taught_force(self, t: Floats) -> Floats | None:
+        """Force along the normal that was learned; None for a skill without.
+
+        Parameters
+        ----------
+        t : array, shape (T,)
+            Non-decreasing from 0, s, on the demonstration's time scale.
+
+        Returns
+        -------
+        array, shape (T,), or None
+            N; 0 where it is too small to be a contact.
+        """
+        if self.force is None:
+            return None
+        found = self.force.at(t, self.spring, self.basis, self.alpha_1, self.duration)
+        return np.where(found < LEAST, 0.0, found)
 
     def response(self, t: Floats) -> "Response":
         """Solve eq. (9)-(11) for unit start, goal and initial velocity, and for the forcing term.

@@ -45,12 +45,20 @@ def evenly_sampled(stroke: Trajectory) -> Trajectory:
     step = float(np.median(steps))
     if is_even(t):
         # Spread rounding of the time stamps over the grid instead of leaving it in the derivatives.
-        return Trajectory(np.linspace(0.0, t[-1], len(t)), stroke.position, stroke.rotation)
+        return Trajectory(
+            np.linspace(0.0, t[-1], len(t)),
+            stroke.position,
+            stroke.rotation,
+            contact_force=stroke.contact_force,
+        )
     from scipy.interpolate import CubicSpline
 
     even = np.linspace(0.0, t[-1], round(float(t[-1]) / step) + 1)
     rotation = None if stroke.rotation is None else rotations.interpolate(t, stroke.rotation, even)
-    return Trajectory(even, CubicSpline(t, stroke.position)(even), rotation)
+    force = stroke.contact_force
+    if force is not None:
+        force = CubicSpline(t, force)(even)
+    return Trajectory(even, CubicSpline(t, stroke.position)(even), rotation, contact_force=force)
 
 
 def is_even(t: Floats) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.dmp.curve import Curve, dense_count
+from dmpcli.dmp.force_profile import unsprung
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.preprocessing import Preprocessed
 from dmpcli.dmp.skill import TaskFrame
@@ -39,12 +40,16 @@ class TaughtStroke:
         Start-goal distance along the chart, mm; 0 of a closed stroke.
     curve : Curve
         u, v, w, mm, and the angles of E, rad, over its own time.
+    force : array, shape (M,), or None
+        Along the normal, N, positive where the work pushes, at as many even times as the curve was
+        laid through; None where none is learned. w is 0 where it presses.
     """
 
     seen: Preprocessed
     frame: TaskFrame
     length: float
     curve: Curve
+    force: Floats | None = None
 
 
 def taught_strokes(
@@ -86,6 +91,11 @@ def taught_strokes(
         return found, None, closed
     tools = [_mean_tool_axis(p) for p in seen]
     normal = None if choices.normal is None else np.array(choices.normal)
+    if normal is not None:
+        samples = [
+            _unsprung(p, x, normal / np.linalg.norm(normal))
+            for p, x in zip(seen, samples, strict=True)
+        ]
     noise = max(p.sigma for p in seen)
     planes = stroke_planes(samples, tools, noise, closed, normal)
     found = [
@@ -159,8 +169,24 @@ def _on_plane(seen: Preprocessed, position: Floats, normal: Floats, closed: bool
         first = rotation[0]
         x[:, 3:] = rotations.to_euler_continuous(axes.T @ rotation @ first.T @ axes)
     frame = TaskFrame(position[0], position[-1], axes, first)
+    force = None
+    if seen.force is not None:
+        force = seen.force(_times(seen, len(position))) @ normal
+        x[:, 2] = unsprung(x[:, 2], force)
     curve = Curve.through(x, seen.duration, seen.intervals)
-    return TaughtStroke(seen, frame, 0.0 if closed else length, curve)
+    return TaughtStroke(seen, frame, 0.0 if closed else length, curve, force)
+
+
+def _unsprung(seen: Preprocessed, position: Floats, normal: Floats) -> Floats:
+    """Positions (T, 3) on a plane whose normal is known, without the pen's own spring.
+
+    Else a pen that is pressed harder towards the goal would lean the chart, which holds both ends.
+    """
+    if seen.force is None:
+        return position
+    height = (position - position[0]) @ normal
+    force = seen.force(_times(seen, len(position))) @ normal
+    return np.asarray(position + (unsprung(height, force) - height)[:, None] * normal)
 
 
 def _on_surface(number: int, seen: Preprocessed, surface: Surface, closed: bool) -> TaughtStroke:
@@ -197,9 +223,13 @@ def _on_surface(number: int, seen: Preprocessed, surface: Surface, closed: bool)
         x[:, 3:] = rotations.to_euler_continuous(E)
     feet = charts.lift(x[None, [0, -1], :3] * [1.0, 1.0, 0.0]).position[0]
     frame = TaskFrame(feet[0], feet[1], axes[0], first)
+    force = None
+    if seen.force is not None:
+        force = np.sum(seen.force(times) * axes[..., 2], axis=1)
+        x[:, 2] = unsprung(x[:, 2], force)
     # A mesh's facets ripple at any frequency.
     curve = Curve.through(x, seen.duration, len(times) - 1)
-    return TaughtStroke(seen, frame, float(charts.lengths[0]), curve)
+    return TaughtStroke(seen, frame, float(charts.lengths[0]), curve, force)
 
 
 def _pinned(uvw: Floats, goal: Floats) -> Floats:

@@ -86,7 +86,11 @@ def even(stroke: Trajectory) -> TimeBase:
     position = np.asarray(PchipInterpolator(t, merged.position, axis=0)(grid))
     R = merged.rotation
     rotation = None if R is None else rotations.interpolate(t, R, grid)
-    return TimeBase(Trajectory(grid, position, rotation), origin, gaps, lost, True)
+    force = merged.contact_force
+    if force is not None:
+        force = np.asarray(PchipInterpolator(t, force, axis=0)(grid))
+    stroke = Trajectory(grid, position, rotation, contact_force=force)
+    return TimeBase(stroke, origin, gaps, lost, True)
 
 
 def _usual_step(steps: Floats) -> float:
@@ -114,7 +118,10 @@ def _merged(stroke: Trajectory, usual: float) -> Trajectory:
     if stroke.rotation is not None:
         q = continuous_quaternions(stroke.rotation)
         rotation = rotations.from_quaternion(np.add.reduceat(q, starts, axis=0))
-    return Trajectory(t, position, rotation)
+    force = stroke.contact_force
+    if force is not None:
+        force = np.add.reduceat(force, starts, axis=0) / counts[:, None]
+    return Trajectory(t, position, rotation, contact_force=force)
 
 
 def _bursts(t: Floats, usual: float) -> Integers:

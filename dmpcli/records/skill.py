@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from dmpcli.arrays import Floats
 from dmpcli.dmp import skill as skills
 from dmpcli.dmp.canonical_system import Basis
+from dmpcli.dmp.force_profile import ForceProfile
 from dmpcli.dmp.skill import Skill, TaskFrame, TaughtSurface
 from dmpcli.dmp.transformation_system import TransformationGains
 from dmpcli.records import json_files
@@ -24,7 +25,9 @@ from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 SCHEMA: Literal["skill"] = "skill"
-VERSION = 2
+VERSION = 3
+# Of skills without a force profile.
+_PLAIN = 2
 
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -92,6 +95,18 @@ class Spread(JsonPart):
     ]
 
 
+class Force(JsonPart):
+    """The force along the normal, N: a seventh primitive on the same phase and basis."""
+
+    weights: Weights
+    alpha_f: float
+    start: Annotated[float, Field(description="x0, N")]
+    goal: Annotated[float, Field(description="g, N")]
+    initial_velocity: Annotated[float, Field(description="V0 = tau dF/dt(0), N")]
+    rms: Annotated[float, Field(ge=0, description="deviation at equal times, N")]
+    largest: Annotated[float, Field(ge=0)]
+
+
 class SkillFile(JsonPart):
     """A dynamic movement primitive of six coordinates, learned by dmpcli fit."""
 
@@ -133,6 +148,7 @@ class SkillFile(JsonPart):
     ] = False
     reached: Reached | None = None
     spread: Spread | None = None
+    force_profile: Annotated[Force | None, Field(description="since version 3")] = None
     reproduction: Annotated[list[Reproduction], Field(min_length=1)]
     options: dict[str, Any]
     inputs: list[dict[str, str]]
@@ -142,6 +158,10 @@ class SkillFile(JsonPart):
         lengths = {len(self.centres), len(self.widths), *(len(row) for row in self.weights)}
         if lengths != {self.basis}:
             raise ValueError(f"centres, widths and weights must each have basis = {self.basis}")
+        if self.force_profile is not None and len(self.force_profile.weights) != self.basis:
+            raise ValueError(f"force_profile.weights must have basis = {self.basis}")
+        if self.force_profile is not None and self.model != "modified":
+            raise ValueError("force_profile belongs to the modified model")
         if min(self.k) <= 0 or min(self.d) <= 0 or min(self.widths) <= 0:
             raise ValueError("k, d and widths must be positive")
         C = np.array(self.task_frame.axes)
@@ -162,9 +182,10 @@ def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenanc
     """Return a skill as the bytes of its JSON file; floats round-trip exactly."""
     frame = skill.frame
     rotation = None if frame.rotation is None else rotations.to_euler(frame.rotation).tolist()
+    force = skill.force
     document = SkillFile(
         schema_name=SCHEMA,
-        version=VERSION,
+        version=_PLAIN if force is None else VERSION,
         tool=provenance.tool,
         model=skill.model,
         forcing_scale=skill.forcing_scale,
@@ -203,11 +224,16 @@ def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenanc
         spread=None
         if skill.spread is None
         else Spread(share=skill.spread.share.tolist(), deviation=skill.spread.deviation.tolist()),
+        force_profile=None
+        if force is None
+        else Force(**asdict(force) | {"weights": force.weights.tolist()}),
         reproduction=reproduction,
         options=provenance.options,
         inputs=list(provenance.inputs),
     )
-    return (_layout(document.model_dump(mode="json", by_alias=True)) + "\n").encode()
+    unsaid = {"force_profile"} if force is None else None
+    content = document.model_dump(mode="json", by_alias=True, exclude=unsaid)
+    return (_layout(content) + "\n").encode()
 
 
 @decoder
@@ -261,7 +287,12 @@ def _skill(file: SkillFile) -> Skill:
         spread=None
         if file.spread is None
         else skills.DemonstrationSpread(array(file.spread.share), array(file.spread.deviation)),
+        force=None if file.force_profile is None else _force(file.force_profile),
     )
+
+
+def _force(part: Force) -> ForceProfile:
+    return ForceProfile(**part.model_dump() | {"weights": np.array(part.weights)})
 
 
 def _layout(value: Any, indent: int = 0) -> str:

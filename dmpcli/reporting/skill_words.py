@@ -23,6 +23,12 @@ def lines(file: SkillFile) -> list[str]:
     if file.model == "modified" and file.learning == "tolerance":
         guessed = "; its side is guessed" if file.side_guessed else ""
         said.append(f"taught {where}, w from {low:.2f} to {high:.2f} mm{guessed}")
+    force = file.force_profile
+    if force is not None:
+        said.append(
+            f"force along the normal from {force.start:.2f} N to {force.goal:.2f} N at the ends: "
+            f"given back with RMS {force.rms:.3g} N, largest {force.largest:.3g} N"
+        )
     if file.spread is not None:
         square = np.mean(np.square(file.spread.deviation), axis=0)
         u, v, w = np.sqrt(square[:3])

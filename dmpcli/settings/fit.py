@@ -21,6 +21,8 @@ from dmpcli.dmp.options import (
 from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.ranges import XYZ
 
+_FORCE = "force_profile"
+
 
 class Count:
     """Of N: what is said of words that are neither ``auto`` nor a number."""
@@ -100,6 +102,9 @@ class FitSettings(Settings):
         float | None, Gt(0), Option("Learn the recording up to here.", "s", unset="its end")
     ] = FitOptions.until
     cut_pauses: Annotated[bool, Option("Take pauses out.")] = FitOptions.cut_pauses
+    force_profile: Annotated[
+        bool, Option("Learn the force along the normal too, of a recording in contact.")
+    ] = FitOptions.force_profile
 
     def __post_init__(self) -> None:
         """Refuse settings that fit their ranges but not each other."""
@@ -112,6 +117,11 @@ class FitSettings(Settings):
             raise ValueError("normal is zero; it must point off the plane, to the tool's side")
         if self.start is not None and self.until is not None and self.until <= self.start:
             raise ValueError(f"until {self.until:g} s is not after from {self.start:g} s")
+
+    def as_options(self) -> dict[str, Any]:
+        """Return the settings as JSON values; a force that nobody asked for leaves no trace."""
+        said = super().as_options()
+        return said if self.force_profile else {k: v for k, v in said.items() if k != _FORCE}
 
     def choices(self) -> FitOptions:
         """Return the settings as the mathematics takes them."""

@@ -1,6 +1,6 @@
 """A trajectory: where a tool is, or shall be, at which time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,12 +21,15 @@ class Trajectory:
         Of the tool, where it is known.
     normal : array, shape (T, 3) or (B, T, 3), or None
         Unit normal of the surface, to the tool's side, where there is one.
+    contact_force : array, shape (T, 3), or None
+        What the work pushes the tool with at the TCP, base axes, N, where it was asked for.
     """
 
     t: Floats
     position: Floats
     rotation: Floats | None = None
     normal: Floats | None = None
+    contact_force: Floats | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.t)

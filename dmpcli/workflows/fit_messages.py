@@ -26,6 +26,10 @@ _IN_PLANE = 0.5
 _FAINT = 0.1
 # Gaps and pauses that are named by their times.
 _SHOWN = 3
+# Samples of a force profile that are looked at.
+_FORCES = 2001
+# Share of a profile's largest force by which it may err, RMS, before that is told.
+_ROUGH = 0.05
 
 
 def summary(output: str, names: Sequence[str], result: "Fit") -> str:
@@ -59,7 +63,23 @@ def summary(output: str, names: Sequence[str], result: "Fit") -> str:
             f"  the demonstrations scatter about their mean by {u:.2f} mm along, {v:.2f} across "
             f"and {w:.2f} off the surface (standard deviation)"
         )
+    if skill.force is not None:
+        lines.append(f"  {_force(skill)}")
     return "\n".join(lines)
+
+
+def _force(skill: "Skill") -> str:
+    force = skill.taught_force(np.linspace(0.0, skill.duration, _FORCES))
+    assert skill.force is not None
+    assert force is not None
+    pressing = force[force > 0.0]
+    if not len(pressing):
+        return "force along the normal: none"
+    return (
+        f"force along the normal {pressing.min():.2f} to {pressing.max():.2f} N, mean "
+        f"{pressing.mean():.2f}, in {100.0 * len(pressing) / len(force):.0f} % of the time; "
+        f"reproduction RMS {skill.force.rms:.3f} N, largest {skill.force.largest:.3f}"
+    )
 
 
 def _taught(skill: "Skill", plane: "StrokePlane | None") -> str:
@@ -231,6 +251,9 @@ def _of_alignment(names: Sequence[str], alignment: "Alignment") -> Iterator[str]
 
 
 def _of_tolerance(result: "Fit") -> Iterator[str]:
+    profile = result.skill.force
+    if profile is not None:
+        yield from _of_force(result.skill)
     reached = result.skill.reached
     if reached is None or reached.within:
         return
@@ -253,3 +276,14 @@ def _of_tolerance(result: "Fit") -> Iterator[str]:
         f"{reached.largest:.3g} mm{heights}, beyond its tolerance of {reached.tolerance:.3g} mm; "
         f"{remedy}"
     )
+
+
+def _of_force(skill: "Skill") -> Iterator[str]:
+    force = skill.taught_force(np.linspace(0.0, skill.duration, _FORCES))
+    assert skill.force is not None
+    assert force is not None
+    if skill.force.rms > _ROUGH * force.max():
+        yield (
+            f"the force profile strays from what was recorded by RMS {skill.force.rms:.2f} N of "
+            f"{force.max():.2f} N: raise --basis, or --cutoff for a smoother force"
+        )

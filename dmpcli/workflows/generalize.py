@@ -145,6 +145,8 @@ def prepared(order: Order) -> Ready:
             "the skill was taught on a surface: its tool turns as it did against that one, about "
             "the axes of the taught start; --orientation surface turns it with this one"
         )
+    if skill.force is not None and settings.force_setpoint is None and settings.offset <= 0.0:
+        tell("fn is the force that was taught; --force-setpoint N presses evenly instead")
     if given is not None and read is not None:
         tell_of_surface(skill, style, given, table, str(read.path))
     _judge(order, table, given, style)

@@ -32,6 +32,7 @@ from dmpcli.workflows.fit import check_said, learn
 from dmpcli.workflows.generalize import Order, prepared
 from dmpcli.workflows.generalize_inputs import one_pair
 from dmpcli.workflows.ranges import within
+from dmpcli.workflows.recording import with_force
 from dmpcli.workflows.surface_input import SurfaceInput
 from dmpcli.workflows.values import Demonstration, DrawnTrajectory, TrajectoryBatch
 
@@ -154,7 +155,11 @@ def fit(
     resolved = resolve(FitSettings, settings, preset)
     files = [one.file() for one in several]
     forms = [one.layout for one in several]
-    strokes = [recordings.read(file, form).stroke for file, form in zip(files, forms, strict=True)]
+    force = resolved.force_profile
+    strokes = []
+    for file, form in zip(files, forms, strict=True):
+        found = recordings.read(file, form, force)
+        strokes.append(with_force(found, file.name) if force else found.stroke)
     known = [form for form in forms if form is not None]
     if any(form != known[0] for form in known):
         raise InputError(

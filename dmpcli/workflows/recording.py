@@ -1,5 +1,8 @@
 """How a recording was read, told by all who take any."""
 
+from dataclasses import replace
+
+from dmpcli.errors import InputError
 from dmpcli.messages import tell, warn
 from dmpcli.records import recordings
 from dmpcli.records.file_io import Source
@@ -8,9 +11,33 @@ from dmpcli.records.recordings import Recording
 from dmpcli.spatial.trajectory import Trajectory
 
 
-def recording(source: Source, layout: Layout | None) -> Trajectory:
-    """Read a recording, and say how it was read and what is doubtful about it."""
-    return whole(source, layout).stroke
+def recording(source: Source, layout: Layout | None, force: bool = False) -> Trajectory:
+    """Read a recording, and say how it was read and what is doubtful about it.
+
+    Parameters
+    ----------
+    source : Source
+    layout : Layout or None
+    force : bool
+        Whether the force on the tool is wanted too.
+
+    Raises
+    ------
+    InputError
+        It holds no force in every row.
+    """
+    found = whole(source, layout, force)
+    return with_force(found, source.name) if force else found.stroke
+
+
+def with_force(found: Recording, name: str) -> Trajectory:
+    """Return a recording's stroke with the force on the tool; refused where it holds none."""
+    if found.wrench is None:
+        raise InputError(
+            f"{name}: --force-profile: holds no wrench in every row; record with --sensor, "
+            "or give a table with fx, fy, fz [N] and tx, ty, tz [N·m] on the tool in base axes"
+        )
+    return replace(found.stroke, contact_force=found.wrench[:, :3])
 
 
 def whole(source: Source, layout: Layout | None, wrench: bool = False) -> Recording:

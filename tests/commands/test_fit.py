@@ -169,3 +169,54 @@ def test_any_number_fits_or_is_refused_in_a_line(recording, tmp_path, option, va
 def test_the_ends_of_every_range_fit_to_finite_weights(recording, tmp_path, options, regression):
     done = run(recording, "-o", tmp_path / "s.json", "--regression", regression, *options)
     assert done.exit_code == 0, done.stderr
+
+
+@pytest.fixture
+def pressed(tmp_path):
+    """A stroke of 10 s drawn in contact, pressed from 3 to 8 N and back by a pen of 2 N/mm."""
+    stroke = paper_stroke()
+    force = 3.0 + 5.0 * np.sin(np.pi * stroke.t / 10.0) ** 2
+    frame = pd.DataFrame(np.column_stack([stroke.t, stroke.position]), columns=list("txyz"))
+    frame["z"] -= force / 2.0
+    frame["rx"], frame["ry"], frame["rz"] = np.pi, 0.0, 0.0
+    for name in ("fx", "fy", "fz"):
+        frame[f"{name} [N]"] = 0.0
+    frame["fz [N]"] = force
+    for name in ("tx", "ty", "tz"):
+        frame[f"{name} [N·m]"] = 0.0
+    frame.to_csv(tmp_path / "pressed.csv", index=False)
+    return tmp_path / "pressed.csv", force
+
+
+def test_a_force_profile_goes_from_the_recording_through_the_skill_into_the_trajectory(
+    pressed, tmp_path
+):
+    file, force = pressed
+    skill, out = tmp_path / "s.json", tmp_path / "t.parquet"
+    normal = ("--normal", 0, 0, 1)
+    done = run(file, "-o", skill, "--force-profile", *normal)
+    assert done.exit_code == 0, done.stderr
+    assert "force along the normal 3.00 to 8.00 N" in done.stderr
+    document = json.loads(skill.read_text())
+    assert document["version"] == 3
+    assert document["force_profile"]["start"] == pytest.approx(3.0, abs=0.01)
+    ends = ("--start", 0, 0, 0, "--goal", 100, 0, 0)
+    done = invoke("generalize", skill, "-o", out, *ends)
+    assert done.exit_code == 0, done.stderr
+    assert "fn is the force that was taught" in done.stderr
+    fn = pd.read_parquet(out)["fn"]
+    np.testing.assert_allclose(fn, force, atol=0.05)
+    invoke("generalize", skill, "-o", out, *ends, "--force-setpoint", 4)
+    assert set(pd.read_parquet(out)["fn"]) == {4.0}
+    assert run(file, "-o", tmp_path / "plain.json", *normal).exit_code == 0
+    plain = json.loads((tmp_path / "plain.json").read_text())
+    assert plain["version"] == 2
+    assert "force_profile" not in plain
+    assert "force_profile" not in plain["options"]
+
+
+def test_a_recording_without_a_wrench_teaches_no_force(recording, tmp_path):
+    done = run(recording, "-o", tmp_path / "s.json", "--force-profile")
+    assert done.exit_code != 0
+    assert "--force-profile: holds no wrench in every row" in done.stderr
+    assert not (tmp_path / "s.json").exists()

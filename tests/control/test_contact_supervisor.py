@@ -256,3 +256,20 @@ def test_a_second_landing_on_what_is_known_is_quicker():
     while not rig.supervisor.settled:
         rig.cycle()
     assert rig.t - begun < 0.75 * first
+
+
+def test_a_wall_is_told_beside_the_force_that_no_loop_of_this_delay_would_have_spared():
+    """10 mm/s into 3 N/mm across: 30 N/s, for the delay and a period, are unavoidable."""
+    rig = Rig(Plant(2.0)).land()
+    supervisor = rig.supervisor
+    for n in range(20):
+        supervisor.step(rig.t + n * PERIOD, 5.0, 0.6 * n, 5.0, 10.0)
+        if supervisor.failure:
+            break
+    wall = supervisor.wall
+    assert wall.across == pytest.approx(4.2)  # the first over 2 N and 0.4 of 5 N
+    assert wall.stiffness == pytest.approx(3.0)
+    assert wall.reaction == pytest.approx(supervisor.delay + PERIOD)
+    assert wall.unavoidable == pytest.approx(30.0 * (supervisor.delay + PERIOD))
+    assert f"{wall.unavoidable:.1f} N are unavoidable at 10 mm/s on 3 N/mm" in supervisor.failure
+    assert supervisor.urgent

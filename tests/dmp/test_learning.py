@@ -218,6 +218,7 @@ def test_the_first_orientation_is_smoothed_too_where_the_recording_begins_before
         ("--cut-pauses", {"cut_pauses": True}),
         ("passes", {"passes": 2}),
         ("--align", {"align": "time"}),
+        ("--force-profile", {"force_profile": True}),
     ],
 )
 @pytest.mark.parametrize("paper", [{"learning": "paper"}, {"model": "original"}])

@@ -1,6 +1,7 @@
 """Skill files: exact, published, and refused by name when wrong."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -38,6 +39,31 @@ def test_a_skill_round_trips_exactly(model, stroke):
     assert after.spring.tau == before.spring.tau
     if before.frame.rotation is not None:
         np.testing.assert_allclose(after.frame.rotation, before.frame.rotation, atol=1e-15)
+
+
+def test_a_force_profile_is_version_3_and_round_trips_exactly():
+    plain = paper_stroke()
+    force = np.zeros((len(plain), 3))
+    force[:, 2] = 3.0 + plain.t / 5.0
+    stroke = replace(plain, contact_force=force)
+    before, content = encoded(stroke, force_profile=True, normal=(0.0, 0.0, 1.0))
+    document = json.loads(content)
+    jsonschema.validate(document, skill.schema())
+    assert document["version"] == 3
+    after, _ = skill.decode(Source("s.json", content))
+    np.testing.assert_array_equal(after.force.weights, before.force.weights)
+    assert replace(after.force, weights=None) == replace(before.force, weights=None)
+    document["force_profile"]["weights"].pop()
+    with pytest.raises(InputError, match=r"force_profile\.weights must have basis = 80"):
+        skill.decode(Source("s.json", json.dumps(document).encode()))
+
+
+def test_a_skill_without_a_force_profile_keeps_its_version_and_its_bytes():
+    document = json.loads(encoded()[1])
+    assert document["version"] == 2
+    assert "force_profile" not in document
+    force = np.ones((len(paper_stroke()), 3))
+    assert encoded(replace(paper_stroke(), contact_force=force))[1] == encoded(paper_stroke())[1]
 
 
 @pytest.mark.parametrize("name", sorted(json_schema.SCHEMAS))
