@@ -133,16 +133,18 @@ def wrong(form: str, values: Floats) -> tuple[int, str] | None:
     int, str
         The row from 0, and what is wrong with it; None where nothing is.
     """
-    if form in QUATERNIONS:
-        norm = np.linalg.norm(values, axis=1)
-        off = np.abs(norm - 1.0) > _UNIT
-        row = int(np.argmax(off))
-        return (row, f"the quaternion has norm {norm[row]:.3g}, not 1") if off.any() else None
-    if form == "matrix":
-        R = values.reshape(-1, 3, 3)
-        excess = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
-        off = (excess > _UNIT) | (np.linalg.det(R) < 0)
-        return (int(np.argmax(off)), "is no rotation matrix") if off.any() else None
+    # What overflows is off, and told as that.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if form in QUATERNIONS:
+            norm = np.linalg.norm(values, axis=1)
+            off = ~(np.abs(norm - 1.0) <= _UNIT)
+            row = int(np.argmax(off))
+            return (row, f"the quaternion has norm {norm[row]:.3g}, not 1") if off.any() else None
+        if form == "matrix":
+            R = values.reshape(-1, 3, 3)
+            excess = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
+            off = ~((excess <= _UNIT) & (np.linalg.det(R) > 0.0))
+            return (int(np.argmax(off)), "is no rotation matrix") if off.any() else None
     return None
 
 

@@ -89,3 +89,13 @@ def test_what_is_no_rotation_is_found_by_row():
 def test_the_lean_is_the_angle_from_straight_down(degrees):
     R = Rotation.from_euler("x", 180.0 - degrees, degrees=True).as_matrix()
     assert rotation_forms.lean(R) == pytest.approx(degrees, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e30, 1e200, np.inf, np.nan])
+@pytest.mark.parametrize(("form", "width"), [("quaternion", 4), ("wxyz", 4), ("matrix", 9)])
+def test_numbers_of_any_size_are_no_rotation_and_no_warning(form, width, size):
+    values = np.zeros((2, width))
+    values[:, [0, 4, 8] if width == 9 else [0]] = 1.0
+    values[1, 1] = size
+    row, _ = rotation_forms.wrong(form, values)
+    assert row == 1
