@@ -6,8 +6,6 @@ letters by N as the tolerance asks, and N = 2000. Then whole processes on a reco
 million rows at 1 kHz.
 """
 
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +18,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from benchmarks.whole_process import taken
 from dmpcli.arrays import Floats
 from dmpcli.dmp import reference_paths
 from dmpcli.dmp.canonical_system import even_in_time, phase
@@ -146,26 +145,9 @@ def long() -> None:
 
 def _process(words: list[str], folder: Path) -> str:
     """Return cells of one run of the installed command."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    begin = time.perf_counter()
-    dmpcli = Path(sys.executable).with_name("dmpcli")
-    # Of its own the child knows its largest size; ours would count all children together.
-    program = (
-        "import resource, subprocess, sys; done = subprocess.run(sys.argv[1:]); "
-        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss); sys.exit(done.returncode)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(dmpcli), *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    clock = time.perf_counter() - begin
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    done = taken(words, folder)
     said = next(line for line in done.stderr.splitlines() if "N = " in line)
-    return f"{clock:.1f} | {spent:.1f} | {int(done.stdout) / 2**10:.0f} | {said.split(', ')[1]}"
+    return f"{done.cells} | {said.split(', ')[1]}"
 
 
 def main() -> None:

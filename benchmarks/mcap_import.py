@@ -5,17 +5,15 @@ Usage: python -m benchmarks.mcap_import [MB] [FOLDER]. The messages are nav_msgs
 """
 
 import itertools
-import resource
 import struct
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from benchmarks.whole_process import taken
 from dmpcli.formats import ros_messages
 
 TYPE = "nav_msgs/msg/Odometry"
@@ -71,30 +69,12 @@ def main(size: float, place: str | None) -> None:
     with tempfile.TemporaryDirectory(dir=place) as name:
         folder = Path(name)
         count = write(folder / "long.mcap", size * 1e6)
-        program = (
-            "import resource, subprocess, sys; done = subprocess.run(sys.argv[1:]); "
-            "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss); "
-            "sys.exit(done.returncode)"
-        )
-        dmpcli = Path(sys.executable).with_name("dmpcli")
-        words = [str(dmpcli), "import", "long.mcap", "-o", "long.parquet"]
-        before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-c", program, *words],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        clock = time.perf_counter() - begin
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        done = taken(["import", "long.mcap", "-o", "long.parquet"], folder)
         print("| MCAP, MB | messages | Parquet, MB | clock, s | processor, s | peak, MiB |")
         print("| ---: | ---: | ---: | ---: | ---: | ---: |")
         print(
             f"| {(folder / 'long.mcap').stat().st_size / 1e6:.0f} | {count:,} "
-            f"| {(folder / 'long.parquet').stat().st_size / 1e6:.0f} | {clock:.0f} | {spent:.0f} "
-            f"| {int(done.stdout) / 2**10:.0f} |"
+            f"| {(folder / 'long.parquet').stat().st_size / 1e6:.0f} | {done.cells} |"
         )
 
 

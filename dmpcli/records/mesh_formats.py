@@ -6,10 +6,8 @@ from dmpcli.errors import InputError
 from dmpcli.records import mesh_obj, mesh_off, mesh_ply, mesh_stl
 from dmpcli.records.file_io import Source
 from dmpcli.records.mesh_polygons import Triangles
+from dmpcli.records.text_lines import MARK
 from dmpcli.records.untrusted import decoder
-
-_MARK = b"\xef\xbb\xbf"
-"""What some programs begin a text with: a byte order mark."""
 
 
 class ForeignMeshError(InputError):
@@ -59,9 +57,9 @@ def looks_like_mesh(source: Source) -> bool:
 
 
 def _unmarked(source: Source) -> Source:
-    if not source.content.startswith(_MARK):
+    if not source.content.startswith(MARK):
         return source
-    return Source(source.name, source.content[len(_MARK) :])
+    return Source(source.name, source.content[len(MARK) :])
 
 
 def _reader(source: Source) -> Callable[[Source], Triangles]:

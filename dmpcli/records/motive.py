@@ -12,7 +12,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
-from dmpcli.records.text_lines import TextLines, every_line
+from dmpcli.records.text_lines import MARK, TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 MAGIC = b"Format Version,"
@@ -22,7 +22,7 @@ _BODIES = ("rigid body", "bone")
 
 def is_motive(source: Source) -> bool:
     """Tell an export by its first words."""
-    return source.content.removeprefix(b"\xef\xbb\xbf").lstrip()[: len(MAGIC)] == MAGIC
+    return source.content.removeprefix(MARK).lstrip()[: len(MAGIC)] == MAGIC
 
 
 @decoder

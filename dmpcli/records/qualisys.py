@@ -11,7 +11,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
-from dmpcli.records.text_lines import TextLines, every_line
+from dmpcli.records.text_lines import TextLines, begins, every_line
 from dmpcli.records.untrusted import decoder
 
 LAYOUT = "qualisys"
@@ -20,7 +20,7 @@ MAGIC = b"NO_OF_FRAMES"
 
 def matches(source: Source) -> bool:
     """Tell an export by its first word."""
-    return source.content.removeprefix(b"\xef\xbb\xbf")[: len(MAGIC)] == MAGIC
+    return begins(source, MAGIC)
 
 
 @decoder

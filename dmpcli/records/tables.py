@@ -17,7 +17,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import columns, list_columns, parquet, untrusted
 from dmpcli.records.file_io import Source
-from dmpcli.records.text_lines import TextLines, counted_lines
+from dmpcli.records.text_lines import MARK, TextLines, counted_lines
 from dmpcli.records.untrusted import decoder
 
 _BLOCK, _LARGEST_BLOCK = 1 << 20, 1 << 24
@@ -442,7 +442,7 @@ def commented_names(source: Source, count: int) -> list[str] | None:
     list of str or None
         None where no line of comment before the rows has that many words.
     """
-    head = source.content[: 1 << 14].removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace")
+    head = source.content[: 1 << 14].removeprefix(MARK).decode("utf-8", "replace")
     for line in reversed(list(itertools.takewhile(_is_passed_over, head.splitlines()))):
         words = line.strip().lstrip("#").strip()
         for parts in (words.split(","), words.split(";"), words.split()):

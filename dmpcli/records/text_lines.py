@@ -12,6 +12,8 @@ from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
 from dmpcli.records.file_io import Source
 
+MARK = b"\xef\xbb\xbf"
+"""Byte order mark of UTF-8."""
 _PASSED_OVER = re.compile(rb"^[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
 _NEWLINE = 10
 _DOUBTFUL = np.isin(np.arange(256), list(b" \t\n#"))
@@ -81,6 +83,11 @@ class TextLines:
         return pa.BufferReader(pa.py_buffer(self.content).slice(self.begin, len(self)))
 
 
+def begins(source: Source, word: bytes) -> bool:
+    """Tell whether a text begins with a word, behind its byte order mark or not."""
+    return source.content.startswith((word, MARK + word))
+
+
 def every_line(source: Source) -> list[str]:
     """Lines of a text file, however they end; without the empty ones at its end.
 
@@ -104,7 +111,7 @@ def counted_lines(source: Source) -> TextLines:
     InputError
         It is not text in UTF-8.
     """
-    content = source.content.removeprefix(b"\xef\xbb\xbf")
+    content = source.content.removeprefix(MARK)
     if not content.isascii():
         try:
             # Only to know that it is text; Arrow takes the bytes.

@@ -13,7 +13,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.tables import Table
-from dmpcli.records.text_lines import TextLines, every_line
+from dmpcli.records.text_lines import MARK, TextLines, every_line
 from dmpcli.records.untrusted import decoder
 
 LAYOUT = "vicon"
@@ -28,7 +28,7 @@ _QUATERNION = {
 
 def matches(source: Source) -> bool:
     """Tell an export by its first two lines: what it holds, and a rate."""
-    head = source.content[:256].removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").split(b"\n")
+    head = source.content[:256].removeprefix(MARK).replace(b"\r\n", b"\n").split(b"\n")
     first = [line.decode("utf-8", "replace").strip(' ,;\t"') for line in head[:2]]
     return len(first) == 2 and first[0] in _KINDS and first[1].replace(".", "", 1).isdigit()
 

@@ -11,7 +11,7 @@ from dmpcli.formats.toolpath import ProgramOptions
 from dmpcli.records.file_io import Source
 from dmpcli.spatial.output_events import OutputEvent
 from tests.formats.motions import motion, wave
-from tests.outside_judge import interpreted, judge, linuxcnc
+from tests.outside_judge import interpreted, judge, judged_by_linuxcnc
 
 OLD_NAMES = pytest.mark.filterwarnings("ignore:.* deprecated:DeprecationWarning")
 """rapidchecker calls pyparsing by names that it warns of."""
@@ -75,7 +75,7 @@ def test_meshlab_reads_our_polylines(tmp_path, suffix):
     assert (mesh.vertex_number(), mesh.edge_number()) == (201, 200)
 
 
-@pytest.mark.skipif(linuxcnc() is None, reason="LinuxCNC's rs274 is not here (tools/linuxcnc.sh)")
+@judged_by_linuxcnc()
 def test_linuxcnc_runs_our_gcode_along_the_same_points(tmp_path):
     strokes = [wave(turning=False), wave(turning=False, offset=200.0, name="b")]
     options = ProgramOptions(tilt=np.radians(30.0))
