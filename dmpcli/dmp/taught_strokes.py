@@ -93,7 +93,7 @@ def taught_strokes(
     normal = None if choices.normal is None else np.array(choices.normal)
     if normal is not None:
         samples = [
-            _unsprung(p, x, normal / np.linalg.norm(normal))
+            without_spring(p, _times(p, len(x)), normal / np.linalg.norm(normal))
             for p, x in zip(seen, samples, strict=True)
         ]
     noise = max(p.sigma for p in seen)
@@ -177,15 +177,29 @@ def _on_plane(seen: Preprocessed, position: Floats, normal: Floats, closed: bool
     return TaughtStroke(seen, frame, 0.0 if closed else length, curve, force)
 
 
-def _unsprung(seen: Preprocessed, position: Floats, normal: Floats) -> Floats:
-    """Positions (T, 3) on a plane whose normal is known, without the pen's own spring.
+def without_spring(seen: Preprocessed, t: Floats, normal: Floats) -> Floats:
+    """Positions of a recording on a plane, without what the pen's own spring gives way.
 
-    Else a pen that is pressed harder towards the goal would lean the chart, which holds both ends.
+    A pen that is pressed harder towards the goal would else lean the chart, which holds both ends.
+
+    Parameters
+    ----------
+    seen : Preprocessed
+    t : array, shape (T,)
+        s.
+    normal : array, shape (3,)
+        Of the plane, on the tool's side.
+
+    Returns
+    -------
+    array, shape (T, 3)
+        mm; as recorded where no force is known.
     """
+    position = seen.position(t)
     if seen.force is None:
         return position
     height = (position - position[0]) @ normal
-    force = seen.force(_times(seen, len(position))) @ normal
+    force = seen.force(t) @ normal
     return np.asarray(position + (unsprung(height, force) - height)[:, None] * normal)
 
 

@@ -33,6 +33,8 @@ class Lesson(BaseModel):
     normal : tuple of float, or None
         Of the skill's plane, on the tool's side; None where it was taught on a surface, and of the
         paper's learning.
+    force_profile : bool
+        Whether the force was learned, and the pen's spring taken off the heights.
     closed : bool or None
         Whether the skill's stroke is; None asks the recording.
     surface : str or None
@@ -51,6 +53,7 @@ class Lesson(BaseModel):
     until: float | None = None
     cut_pauses: bool = False
     normal: Vector | None = None
+    force_profile: bool = False
     closed: bool | None = None
     surface: str | None = None
     recordings: tuple[str, ...] = ()
@@ -67,6 +70,7 @@ class Lesson(BaseModel):
             until=self.until,
             cut_pauses=self.cut_pauses,
             normal=self.normal,
+            force_profile=self.force_profile,
         )
 
     def of(self, sha256: str) -> "Lesson":
@@ -112,6 +116,7 @@ def of_skill(file: SkillFile) -> Lesson:
             "basis": file.basis if paper else None,
             "normal": None if paper or surface else tuple(row[2] for row in axes),
             "closed": None if paper else file.closed,
+            "force_profile": file.force_profile is not None,
             "surface": surface,
             "recordings": tuple(said["sha256"] for said in file.inputs if _taught(said)),
         },

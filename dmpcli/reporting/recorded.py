@@ -1,7 +1,7 @@
 """A recording as a stroke of the report: seen as the skill saw it that a stroke was drawn with."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from dmpcli.dmp.contact_heights import demonstrated_scale
 from dmpcli.dmp.learning import lost_of
 from dmpcli.dmp.preprocessing import Preprocessed, preprocess
 from dmpcli.dmp.skill import Accuracy, Skill
-from dmpcli.dmp.taught_strokes import TaughtStroke, taught_strokes
+from dmpcli.dmp.taught_strokes import TaughtStroke, taught_strokes, without_spring
 from dmpcli.errors import InputError
 from dmpcli.records import schemas
 from dmpcli.records.learning_record import Lesson
@@ -43,6 +43,8 @@ class Recorded:
         Those that the report was given, by their facts.
     skills : sequence of (Lesson, Skill)
         Those that the report was given.
+    force : array, shape (T, 3), optional
+        On the tool, N, base axes.
     began : float, optional
         What the recording's own clock showed at time 0, s; None where that is not known.
     """
@@ -55,6 +57,7 @@ class Recorded:
     origin: Provenance = field(default_factory=lambda: Provenance(""))
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     skills: Sequence[tuple[Lesson, Skill]] = ()
+    force: Floats | None = None
     began: float | None = None
 
     def __post_init__(self) -> None:
@@ -76,18 +79,25 @@ class Recorded:
         return self._views[lesson]
 
     def seen(self, lesson: Lesson) -> Preprocessed:
-        """Return it smoothed by its noise, cut as a lesson says."""
+        """Return it smoothed by its noise, cut as a lesson says.
+
+        Raises
+        ------
+        InputError
+            Its force was learned too, and is not read.
+        """
         cut = Lesson(
             cutoff=None if lesson.learning == "paper" else lesson.cutoff,
             trim=lesson.trim,
             start=lesson.start,
             until=lesson.until,
             cut_pauses=lesson.cut_pauses,
+            force_profile=lesson.force_profile,
         )
         if cut not in self._seen:
             _enough(len(self.recording.t))
             self._seen[cut] = preprocess(
-                self.recording,
+                replace(self.recording, contact_force=self._force() if cut.force_profile else None),
                 cutoff=cut.cutoff,
                 trim=cut.trim,
                 start=cut.start,
@@ -95,6 +105,14 @@ class Recorded:
                 cut_pauses=cut.cut_pauses,
             )
         return self._seen[cut]
+
+    def _force(self) -> Floats:
+        if self.force is None:
+            raise InputError(
+                f"{self.name or self.label}: its force was taught, and no wrench is read in it; "
+                "give the options that fit was given"
+            )
+        return self.force
 
     def taught(self, lesson: Lesson) -> TaughtStroke | None:
         """Return it in a skill's coordinates; None where the taught surface is not at hand."""
@@ -110,7 +128,8 @@ class Recorded:
         seen, taught = self.seen(lesson), self.taught(lesson)
         t = seen.raw.t
         _enough(len(t))
-        position, place, length, elsewhere = seen.position(t), None, None, False
+        position, raw = seen.position(t), seen.raw.position
+        place, length, elsewhere = None, None, False
         lost, skill = lost_of(seen), None
         if taught is None:
             # The surface is not at hand: the skill's own curve tells what was demonstrated on it.
@@ -124,11 +143,17 @@ class Recorded:
             axes = None
             length = None if place is None or closed else float(place[-1, 0] - place[0, 0])
         else:
+            surface = None if lesson.surface is None else self.surfaces[lesson.surface]
+            if lesson.force_profile and (surface is None or isinstance(surface, Plane)):
+                # On a curved one the chart's place, which is compared, is without it.
+                as_seen = position
+                position = without_spring(seen, t, taught.frame.axes[:, 2])
+                raw = raw + position - as_seen
             start, goal, closed = taught.frame.start, taught.frame.goal, not taught.length
             axes = taught.frame.axes
-            if lesson.surface is not None:
+            if surface is not None:
                 place, length = taught.curve(t)[:, :3], taught.length
-                if not isinstance(self.surfaces[lesson.surface], Plane):
+                if not isinstance(surface, Plane):
                     axes = None
         if self.normal is not None and lesson.surface is None and axes is not None:
             tool = None if seen.rotation is None else seen.rotation(t[:1])[0, :, 2]
@@ -137,7 +162,7 @@ class Recorded:
         return ReportedStroke(
             t=t,
             position=position,
-            raw=seen.raw.position,
+            raw=raw,
             start=start,
             goal=goal,
             axes=axes,

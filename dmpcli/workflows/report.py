@@ -183,10 +183,16 @@ def _part(
         return DocumentPart(label, source.sha256, skills.SCHEMA, pupil=pupil, origin=origin)
     found = records.decode(source) if records.is_ours(source) else None
     if found is None or found.schema is schemas.DEMONSTRATION:
-        seen = recording.whole(source, None if found else form)
+        seen = recording.whole(source, None if found else form, wrench=True)
         kind = "recording" if found is None else "demonstration"
         recorded = Recorded(
-            seen.stroke, label, source.name, source.sha256, normal, began=seen.began
+            seen.stroke,
+            label,
+            source.name,
+            source.sha256,
+            normal,
+            force=None if seen.wrench is None else seen.wrench[:, :3],
+            began=seen.began,
         )
         if found is not None:
             recorded.origin = found.provenance

@@ -215,6 +215,28 @@ def test_a_force_profile_goes_from_the_recording_through_the_skill_into_the_traj
     assert "force_profile" not in plain["options"]
 
 
+@pytest.mark.parametrize("named", ["normal", "surface"])
+def test_report_takes_the_pens_spring_off_a_recording_whose_force_was_taught(
+    pressed, named, tmp_path
+):
+    file, _ = pressed
+    plane = tmp_path / "plane.json"
+    level = {"point": paper_stroke().position[0].tolist(), "normal": [0, 0, 1]}
+    plane.write_text(json.dumps(level))
+    where = ("--normal", 0, 0, 1) if named == "normal" else ("--surface", plane)
+    skill, out = tmp_path / "s.json", tmp_path / "t.parquet"
+    assert run(file, "-o", skill, "--force-profile", *where).exit_code == 0
+    on = () if named == "normal" else where
+    assert invoke("generalize", skill, "-o", out, "--reproduce", *on).exit_code == 0
+    done = invoke("report", file, out, *on, "--json")
+    assert done.exit_code == 0, done.stderr
+    [recorded], [drawn] = (one["strokes"] for one in json.loads(done.stdout)["files"])
+    assert drawn["deviation"]["nearest_max"] < 0.06  # 4 mm deep in its spring
+    if on:
+        assert drawn["surface"]["distance_max"] < 1e-6
+    assert abs(recorded["wave"]["mean"] - drawn["wave"]["mean"]) < 0.05
+
+
 def test_a_recording_without_a_wrench_teaches_no_force(recording, tmp_path):
     done = run(recording, "-o", tmp_path / "s.json", "--force-profile")
     assert done.exit_code != 0
