@@ -118,7 +118,8 @@ class PairStream:
     def _of_parquet(self, rows: int) -> Iterator[tuple[tables.Table, list[str]]]:
         name = str(self.path)
         known = (*pairs.KNOWN, *schemas.PAIRS.columns)
-        with untrusted.decoding(name), pq.ParquetFile(self.path) as file:
+        opened = parquet.opened(self.path, "make it again", text=())
+        with untrusted.decoding(name), opened as file:
             names = file.schema_arrow.names
             wanted = [one for one in names if one in pairs.KNOWN]
             unknown = [one for one in names if one not in known]
