@@ -1,7 +1,7 @@
 import pytest
 
 from tests.faults.planted import PLANTED
-from tests.faults.runs import run
+from tests.faults.runs import MOVED, run
 from tests.faults.world import World
 
 
@@ -27,7 +27,8 @@ def test_invariants_hold_for_more_seeds(first):
 
 
 def test_without_faults_every_command_is_done():
-    for command in ("execute", "execute felt", "execute pressed", "execute file", "record"):
+    commands = ("execute", MOVED, "execute felt", "execute pressed", "execute file", "record")
+    for command in commands:
         finding = run(7, (), command)
         assert (finding.code, finding.wrong) == (0, []), told(finding)
 
