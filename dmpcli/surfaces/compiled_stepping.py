@@ -1,11 +1,16 @@
 """`geodesic_stepping` by compiled kernels, for meshes that are `compiled`; see there."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import geodesic_stepping
 from dmpcli.surfaces.geodesic_stepping import Front
 from dmpcli.surfaces.triangle_mesh import ON_BORDER, TriangleMesh
+
+if TYPE_CHECKING:
+    from dmpcli.surfaces.kernels import stepping
 
 
 def start(

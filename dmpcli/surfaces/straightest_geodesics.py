@@ -84,10 +84,14 @@ def _run(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Boolean
 
 
 def _run_compiled(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Booleans:
-    from dmpcli.surfaces.kernels import facet_walks
+    from dmpcli.surfaces.kernels import facet_walks, tree
 
-    walks = state.position, state.heading, state.face, remaining
-    return facet_walks.run(mesh.facets, *walks, MOST_FACETS)
+    facets, order = mesh.facets, mesh.for_kernels.rows
+    rows = order[state.face]
+    walks = state.position, state.heading, rows, remaining
+    arrived = facet_walks.run(facets.reals, facets.numbers, *walks, MOST_FACETS)
+    state.face = facets.numbers[rows, tree.FACE].astype(np.int64)
+    return arrived
 
 
 def _exit(

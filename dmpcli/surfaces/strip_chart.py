@@ -177,9 +177,7 @@ def _feet(
     face = face.reshape(i.shape)
     allowed = np.maximum(mesh.reach[face], geodesic_stepping.LANDING * nodes.away[pair, i, j])
     far = ~beyond & (length(point - foot)[..., 0] > allowed)
-    return _Feet(
-        foot, across(e_v, normal), normal, face, nodes.stretch[nearest], beyond, far, back
-    )
+    return _Feet(foot, across(e_v, normal), normal, face, nodes.stretch[nearest], beyond, far, back)
 
 
 def _feet_compiled(
@@ -191,9 +189,7 @@ def _feet_compiled(
     shape = along.shape
     foot, e_v, normal = (np.empty((*shape, 3)) for _ in range(3))
     beyond, far, back = np.empty((3, *shape), dtype=bool)
-    feet = _Feet(
-        foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back
-    )
+    feet = _Feet(foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back)
     samples.lift(
         mesh.facets,
         samples.Strip(nodes.values, nodes.normal, nodes.stretch, nodes.away),

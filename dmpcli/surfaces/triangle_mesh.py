@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from igl import AABB
 
     from dmpcli.surfaces.developable import Developable
+    from dmpcli.surfaces.kernels.mesh import Compiled
     from dmpcli.surfaces.kernels.tree import Facets
     from dmpcli.surfaces.slits import Slits
 
@@ -108,12 +109,18 @@ class TriangleMesh:
         twin.compiled = True
         return twin
 
-    @cached_property
+    @property
     def facets(self) -> "Facets":
         """The facets as kernels want them."""
-        from dmpcli.surfaces.kernels.mesh import Geometry, facets_of
+        return self.for_kernels.facets
 
-        return facets_of(
+    @cached_property
+    def for_kernels(self) -> "Compiled":
+        """What kernels work on."""
+        from dmpcli.surfaces.kernels.mesh import Geometry, compiled
+
+        topology = self.topology
+        return compiled(
             Geometry(
                 self.F,
                 self.corners,
@@ -121,10 +128,9 @@ class TriangleMesh:
                 self.corner_normals,
                 self.reach,
                 self.components,
-                self.topology.neighbours,
-                self.topology.border,
-                self.topology.border_vertices,
-                self._middle,
+                topology.neighbours,
+                topology.border,
+                topology.border_vertices,
             )
         )
 

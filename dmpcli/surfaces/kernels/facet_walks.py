@@ -4,7 +4,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.compiled import kernel
-from dmpcli.surfaces.kernels.tree import Facets, corner, flat_normal
+from dmpcli.surfaces.kernels.tree import corner, flat_normal, outward_of
 from dmpcli.surfaces.kernels.vectors import (
     Vector,
     add,
@@ -19,16 +19,16 @@ from dmpcli.surfaces.kernels.vectors import (
 
 
 @kernel
-def _exit(facets: Facets, p: Vector, d: Vector, row: int, entry: int) -> tuple[int, float]:
+def _exit(reals: Floats, p: Vector, d: Vector, row: int, entry: int) -> tuple[int, float]:
     """Edge through which a walk leaves its facet, and the way to it."""
     edge, way = 0, np.inf
     for k in range(3):
         if k == entry:
             continue
-        outward = at(facets.edges[row].reshape(-1, 3), k)
+        outward = outward_of(reals, row, k)
         speed = dot(outward, d)
         if speed > 1e-14:
-            room = max(dot(outward, sub(corner(facets.corners, row, k), p)), 0.0) / speed
+            room = max(dot(outward, sub(corner(reals, row, k), p)), 0.0) / speed
             if room < way:
                 edge, way = k, room
     return edge, way
@@ -36,40 +36,41 @@ def _exit(facets: Facets, p: Vector, d: Vector, row: int, entry: int) -> tuple[i
 
 @kernel
 def run(
-    facets: Facets,
+    reals: Floats,
+    numbers: Integers,
     position: Floats,
     heading: Floats,
-    face: Integers,
+    rows: Integers,
     remaining: Floats,
     most: int,
 ) -> Booleans:
     """Walk lengths (M,), mm, in place, over no more than so many facets; tell which got there."""
     arrived = np.zeros(len(remaining), dtype=np.bool_)
     for i in range(len(remaining)):
-        p, d, row, left = at(position, i), at(heading, i), facets.rows[face[i]], remaining[i]
+        p, d, row, left = at(position, i), at(heading, i), rows[i], remaining[i]
         entry = -1
         for _ in range(most):
-            edge, way = _exit(facets, p, d, row, entry)
+            edge, way = _exit(reals, p, d, row, entry)
             p = add(p, times(min(way, left), d))
             if left <= way:
                 arrived[i] = True
                 break
             left -= way
-            after = facets.neighbours[row, edge]
+            after = numbers[row, edge]
             if after < 0:
                 break
-            n = flat_normal(facets, row)
-            a = corner(facets.corners, row, edge)
-            along = unit(sub(corner(facets.corners, row, (edge + 1) % 3), a))
+            n = flat_normal(reals, row)
+            a = corner(reals, row, edge)
+            along = unit(sub(corner(reals, row, (edge + 1) % 3), a))
             part, out = dot(d, along), dot(d, cross(along, n))
-            d = unit(add(times(part, along), times(out, cross(along, flat_normal(facets, after)))))
+            d = unit(add(times(part, along), times(out, cross(along, flat_normal(reals, after)))))
             entry = 0
             for k in range(3):
-                if facets.neighbours[after, k] == row:
+                if numbers[after, k] == row:
                     entry = k
                     break
             row = after
         put(position, i, p)
         put(heading, i, d)
-        face[i] = facets.faces[row]
+        rows[i] = row
     return arrived

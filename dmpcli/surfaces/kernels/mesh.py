@@ -22,44 +22,41 @@ class Geometry:
     neighbours: Integers
     border: Booleans
     border_vertices: Booleans
-    middle: Floats
 
 
-def facets_of(mesh: Geometry) -> Facets:
+@dataclass(frozen=True)
+class Compiled:
+    """Facets, and where those of the mesh lie in their order, shape (m,)."""
+
+    facets: Facets
+    rows: Integers
+
+
+def compiled(mesh: Geometry) -> Compiled:
     """Make facets ready: a record of each, in the order of a search tree."""
     order, first = tree.ordered(mesh.corners, tree.depth_of(len(mesh.faces)))
     m = len(order)
-    corners = np.empty((m, 12))
-    corners[:, :9] = mesh.corners[order].reshape(m, 9)
-    corners[:, 9:] = mesh.face_normals[order]
-    exact = tree.boxes_of(corners, first)
-    boxes = exact.astype(np.float32)
-    low, high = np.float32(-np.inf), np.float32(np.inf)
-    boxes[:, :3], boxes[:, 3:] = (
-        np.nextafter(boxes[:, :3], low),
-        np.nextafter(boxes[:, 3:], high),
-    )
-    maps, edges = np.empty((m, 12)), np.empty((m, 12))
-    tree.fill(corners, mesh.corner_normals[order], mesh.middle, maps, edges)
-    rows = np.empty_like(order)
-    rows[order] = np.arange(m, dtype=order.dtype)
+    reals = np.zeros((m, tree.REALS))
+    reals[:, : tree.NORMAL] = mesh.corners[order].reshape(m, 9)
+    reals[:, tree.NORMAL : tree.MAP] = mesh.face_normals[order]
+    reals[:, tree.REACH], reals[:, tree.CLEARANCE] = mesh.reach[order], -1.0
+    tree.fill(reals, mesh.corner_normals[order])
+    rows = np.empty(m, dtype=np.int64)
+    rows[order] = np.arange(m)
+    numbers = np.zeros((m, tree.NUMBERS), dtype=np.int32)
     across = mesh.neighbours[order]
-    across = np.where(across >= 0, rows[across], across).astype(np.int32)
+    numbers[:, :3] = np.where(across >= 0, rows[across], across)
     bits = np.array([1, 2, 4])
-    flags = mesh.border[order] @ bits + 8 * (mesh.border_vertices[mesh.faces[order]] @ bits)
-    limits = np.stack([mesh.reach[order], np.full(m, -1.0), np.zeros(m)], axis=1)
-    return Facets(
-        boxes,
-        first,
-        corners,
-        maps,
-        edges,
-        limits,
-        across,
-        flags.astype(np.uint8),
-        mesh.components[order].astype(np.int32),
-        order,
-        rows,
-        mesh.faces[order].astype(np.int32),
-        np.ascontiguousarray(mesh.middle),
-    )
+    ends = mesh.border_vertices[mesh.faces[order]]
+    numbers[:, tree.FLAGS] = mesh.border[order] @ bits + 8 * (ends @ bits)
+    numbers[:, tree.PART], numbers[:, tree.FACE] = mesh.components[order], order
+    numbers[:, tree.VERTICES : tree.VERTICES + 3] = mesh.faces[order]
+    return Compiled(Facets(_outwards(tree.boxes_of(reals, first)), first, reals, numbers), rows)
+
+
+def _outwards(boxes: Floats) -> Floats:
+    """Boxes in single precision that hold these."""
+    rounded = boxes.astype(np.float32)
+    for corner, way in ((slice(3), -np.inf), (slice(3, 6), np.inf)):
+        rounded[:, corner] = np.nextafter(rounded[:, corner], np.float32(way))
+    return rounded

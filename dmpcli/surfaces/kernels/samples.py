@@ -12,12 +12,20 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import (
+    CLEARANCE,
+    EDGES,
+    FACE,
+    PART,
+    REACH,
+    SLOPE,
+    VERTICES,
     Facets,
     beyond_border,
     closest,
     corner,
     flat_normal,
     on_facet,
+    outward_of,
     smooth_normal,
     stack,
 )
@@ -34,38 +42,33 @@ _ROOM = 1e-9
 
 
 @kernel
-def _outward(facets: Facets, row: int, k: int) -> Vector:
-    return facets.edges[row, 3 * k], facets.edges[row, 3 * k + 1], facets.edges[row, 3 * k + 2]
-
-
-@kernel
-def _beside(facets: Facets, row: int, k: int, p: Vector) -> float:
+def _beside(reals: Floats, row: int, k: int, p: Vector) -> float:
     """How far a point lies beyond the line of an edge, in the facet's plane."""
-    return dot(_outward(facets, row, k), p) - facets.edges[row, 9 + k]
+    return dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k]
 
 
 @kernel
-def _steepness(facets: Facets, row: int, other: int) -> float:
+def _steepness(reals: Floats, numbers: Integers, row: int, other: int) -> float:
     """How steep a facet that shares a corner leaves the plane of another, by the way outwards.
 
     Over any point of it lies at most so much more height over the plane per distance from the
     facet; infinite where its projection may fall back onto the facet.
     """
-    n = flat_normal(facets, row)
+    n = flat_normal(reals, row)
     steepest = np.inf
     for mode in range(6):
         k = mode % 3
-        way = _outward(facets, row, k)
+        way = outward_of(reals, row, k)
         if mode >= 3:  # beyond the corner between two edges
-            way = unit(add(way, _outward(facets, row, (k + 1) % 3)))
-        shared = facets.vertices[row, (k + 1) % 3]
-        start = corner(facets.corners, row, (k + 1) % 3)
+            way = unit(add(way, outward_of(reals, row, (k + 1) % 3)))
+        shared = numbers[row, VERTICES + (k + 1) % 3]
+        start = corner(reals, row, (k + 1) % 3)
         worst = 0.0
         for j in range(3):
-            v = facets.vertices[other, j]
-            if v == shared or (mode < 3 and v == facets.vertices[row, k]):
+            v = numbers[other, VERTICES + j]
+            if v == shared or (mode < 3 and v == numbers[row, VERTICES + k]):
                 continue
-            gap = sub(corner(facets.corners, other, j), start)
+            gap = sub(corner(reals, other, j), start)
             out, up = dot(way, gap), abs(dot(n, gap))
             worst = max(worst, up / out) if out > 1e-12 else np.inf
         steepest = min(steepest, worst)
@@ -73,24 +76,24 @@ def _steepness(facets: Facets, row: int, other: int) -> float:
 
 
 @kernel
-def _apart(facets: Facets, row: int, other: int) -> float:
+def _apart(reals: Floats, row: int, other: int) -> float:
     """Distance that two facets have at least: along edges, corners and normal of the first."""
-    n = flat_normal(facets, row)
-    a = corner(facets.corners, row, 0)
+    n = flat_normal(reals, row)
+    a = corner(reals, row, 0)
     least, most = np.inf, -np.inf
     for j in range(3):
-        up = dot(n, sub(corner(facets.corners, other, j), a))
+        up = dot(n, sub(corner(reals, other, j), a))
         least, most = min(least, up), max(most, up)
     apart = max(least, -most, 0.0)
     for mode in range(6):
         k = mode % 3
-        way = _outward(facets, row, k)
+        way = outward_of(reals, row, k)
         if mode >= 3:
-            way = unit(add(way, _outward(facets, row, (k + 1) % 3)))
-        start = corner(facets.corners, row, (k + 1) % 3)
+            way = unit(add(way, outward_of(reals, row, (k + 1) % 3)))
+        start = corner(reals, row, (k + 1) % 3)
         out = np.inf
         for j in range(3):
-            out = min(out, dot(way, sub(corner(facets.corners, other, j), start)))
+            out = min(out, dot(way, sub(corner(reals, other, j), start)))
         apart = max(apart, out)
     return apart
 
@@ -98,13 +101,13 @@ def _apart(facets: Facets, row: int, other: int) -> float:
 @kernel
 def _know(facets: Facets, row: int, nodes: Integers) -> None:
     """Find clearance and slope of a facet, see `certified`."""
+    reals, numbers = facets.reals, facets.numbers
     reach = 2.0 * _NEAR
     low = np.empty(3)
     high = np.empty(3)
     for k in range(3):
-        c = facets.corners
-        low[k] = min(c[row, k], c[row, 3 + k], c[row, 6 + k]) - reach
-        high[k] = max(c[row, k], c[row, 3 + k], c[row, 6 + k]) + reach
+        a, b, c = reals[row, k], reals[row, 3 + k], reals[row, 6 + k]
+        low[k], high[k] = min(a, b, c) - reach, max(a, b, c) + reach
     clearance, steepest = reach, 0.0
     inner = len(facets.first) - 2
     nodes[0], held = 0, 1
@@ -128,14 +131,14 @@ def _know(facets: Facets, row: int, nodes: Integers) -> None:
             touches = False
             for i in range(3):
                 for j in range(3):
-                    touches |= facets.vertices[row, i] == facets.vertices[other, j]
+                    touches |= numbers[row, VERTICES + i] == numbers[other, VERTICES + j]
             if touches:
-                steepest = max(steepest, _steepness(facets, row, other))
+                steepest = max(steepest, _steepness(reals, numbers, row, other))
             else:
-                clearance = min(clearance, _apart(facets, row, other))
-    facets.limits[row, 1] = max(clearance, 0.0)
+                clearance = min(clearance, _apart(reals, row, other))
+    facets.reals[row, CLEARANCE] = max(clearance, 0.0)
     # The tangent of half the angle.
-    facets.limits[row, 2] = (
+    facets.reals[row, SLOPE] = (
         steepest / (1.0 + math.sqrt(1.0 + steepest * steepest)) if steepest < np.inf else np.inf
     )
 
@@ -149,10 +152,10 @@ def certified(facets: Facets, row: int, height: float, inside: float, nodes: Int
     a cone that begins `inside` away, mm, and that a point at a height stays off by more than the
     height where inside > height tan(angle / 2).
     """
-    if facets.limits[row, 1] < 0.0:
+    if facets.reals[row, CLEARANCE] < 0.0:
         _know(facets, row, nodes)
-    near = 2.0 * height + _ROOM < facets.limits[row, 1]
-    return near and inside > height * facets.limits[row, 2] + _ROOM
+    near = 2.0 * height + _ROOM < facets.reals[row, CLEARANCE]
+    return near and inside > height * facets.reals[row, SLOPE] + _ROOM
 
 
 @kernel
@@ -160,18 +163,19 @@ def followed(
     facets: Facets, p: Vector, row: int, nodes: Integers, offs: Floats
 ) -> tuple[Vector, int]:
     """Closest point of the mesh, and its row, from a facet nearby on."""
+    reals = facets.reals
     for _ in range(_MOST):
         edge, beside = 0, -np.inf
         for k in range(3):
-            off = _beside(facets, row, k, p)
+            off = _beside(reals, row, k, p)
             if off > beside:
                 edge, beside = k, off
         if beside < 0.0:
-            height = abs(dot(flat_normal(facets, row), sub(p, corner(facets.corners, row, 0))))
+            height = abs(dot(flat_normal(reals, row), sub(p, corner(reals, row, 0))))
             if height < _NEAR and certified(facets, row, height, -beside, nodes):
-                return on_facet(facets.corners, row, p), row
+                return on_facet(reals, row, p), row
             break
-        row = facets.neighbours[row, edge]
+        row = facets.numbers[row, edge]
         if row < 0:
             break
     return closest(facets, p, nodes, offs)
@@ -259,25 +263,25 @@ def lift(
     for b in range(len(u)):
         row = -1
         for k in range(u.shape[1]):
-            i = min(max(int(math.floor(u[b, k])), 0), nu - 1)
-            j = min(max(int(math.floor(v[b, k])), 0), nv - 1)
+            i = min(max(math.floor(u[b, k]), 0), nu - 1)
+            j = min(max(math.floor(v[b, k]), 0), nv - 1)
             r, s = u[b, k] - i, v[b, k] - j
             p, way = _patch(strip.values[b], i, j, r, s)
             if row < 0:
                 foot, row = closest(facets, p, nodes, offs)
             else:
                 foot, row = followed(facets, p, row, nodes, offs)
-            n = times(sign[b, 0], smooth_normal(facets, foot, row))
+            n = times(sign[b, 0], smooth_normal(facets.reals, foot, row))
             a, c = i + (1 if r > 0.5 else 0), j + (1 if s > 0.5 else 0)
-            beyond = facets.parts[row] != part[b]
+            beyond = facets.numbers[row, PART] != part[b]
             beyond = beyond or beyond_border(facets, p, foot, row, limits.on_border)
             near = strip.normal[b, a, c]
             out.back[b, k] = not beyond and dot(n, (near[0], near[1], near[2])) < 0.0
-            allowed = max(facets.limits[row, 0], limits.landing * strip.away[b, i, j])
+            allowed = max(facets.reals[row, REACH], limits.landing * strip.away[b, i, j])
             out.far[b, k] = not beyond and length(sub(p, foot)) > allowed
             out.beyond[b, k] = beyond
             out.stretch[b, k] = strip.stretch[b, a, c]
-            out.face[b, k] = facets.faces[row]
+            out.face[b, k] = facets.numbers[row, FACE]
             out.foot[b, k, 0], out.foot[b, k, 1], out.foot[b, k, 2] = foot
             out.normal[b, k, 0], out.normal[b, k, 1], out.normal[b, k, 2] = n
             side = across(way, n)

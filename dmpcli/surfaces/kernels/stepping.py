@@ -2,11 +2,17 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.compiled import kernel
-from dmpcli.surfaces.kernels.tree import Facets, beyond_border, closest, smooth_normal, stack
+from dmpcli.surfaces.kernels.tree import (
+    PART,
+    REACH,
+    Facets,
+    beyond_border,
+    closest,
+    smooth_normal,
+    stack,
+)
 from dmpcli.surfaces.kernels.vectors import (
     Vector,
     across,
@@ -71,8 +77,8 @@ def _probe(
 ) -> tuple[Vector, bool]:
     """Normal at the closest point, and whether the surface goes on there."""
     foot, row = closest(facets, p, nodes, offs)
-    there = times(sign, smooth_normal(facets, foot, row))
-    good = dot(there, normal) > limits.sharp and facets.parts[row] == part
+    there = times(sign, smooth_normal(facets.reals, foot, row))
+    good = dot(there, normal) > limits.sharp and facets.numbers[row, PART] == part
     return there, good and not beyond_border(facets, p, foot, row, limits.on_border)
 
 
@@ -153,14 +159,14 @@ def _step(
     guess = sub(add(x, times(h, t)), times(0.5 * h * h * kappa, n))
     guess = sub(guess, times((h * h * h / 6.0) * kappa, slope))
     foot, row = closest(facets, guess, nodes, offs)
-    after = times(sign, smooth_normal(facets, foot, row))
+    after = times(sign, smooth_normal(facets.reals, foot, row))
     turn = dot(after, n)
     gap = length(sub(foot, guess))
     back = turn < limits.back
-    other = facets.parts[row] != part or back
+    other = facets.numbers[row, PART] != part or back
     sharp = not other and turn < limits.sharp
     allowed = limits.landing * away if was_off else limits.jump * h
-    off = other or (not sharp and gap > max(allowed, facets.limits[row, 0]))
+    off = other or (not sharp and gap > max(allowed, facets.reals[row, REACH]))
     off = off or beyond_border(facets, guess, foot, row, limits.on_border)
     if off:
         foot = guess

@@ -21,48 +21,32 @@ _BALL = 0.2**2
 class Facets(NamedTuple):
     """Facets of a mesh in the tree's order, and the tree.
 
+    Few arrays: each costs when it is handed on, and what is asked of a facet lies together.
+
     Attributes
     ----------
     boxes : array of float32, shape (nodes, 6)
         Least and largest corner of what is in a node, mm.
     first : array of int32, shape (leaves + 1,)
         Where the facets of each leaf begin.
-    corners : array, shape (m, 12)
-        Three corners and the unit normal.
-    maps : array, shape (m, 12)
-        Affine map from a position, counted from `middle`, to the smooth normal: 3 x 3, then 3.
-    edges : array, shape (m, 12)
-        Unit vectors in the facet's plane, square to its edges, outwards; then how far along them
-        the edges lie.
-    limits : array, shape (m, 3)
-        Reach, mm; then, once known, what `certified` asks: clearance, mm (-1 before), and slope.
-    neighbours : array of int32, shape (m, 3)
-        Across each edge, or -1, -2; see `Topology`.
-    flags : array of uint8, shape (m,)
-        Bits 0 to 2: edges of the border; 3 to 5: corners of it.
-    parts : array of int32, shape (m,)
-        Component.
-    faces : array of int32, shape (m,)
-        The number that the mesh has for it.
-    rows : array of int32, shape (m,)
-        The inverse.
-    vertices : array of int32, shape (m, 3)
-    middle : array, shape (3,)
+    reals : array, shape (m, 40)
+        From 0: three corners; `NORMAL`: unit normal; `MAP`: affine map, 3 x 3 and 3, from a
+        position, counted from the first corner, to the smooth normal; `EDGES`: unit vectors in the
+        plane, square to the edges, outwards, and how far along them the edges lie; `REACH`, mm;
+        then, once known, what `samples.certified` asks: `CLEARANCE`, mm (-1 before), and `SLOPE`.
+    numbers : array of int32, shape (m, 16)
+        From 0: `Topology.neighbours`, in the tree's order; `FLAGS`: bits 0 to 2 are edges of the
+        border, 3 to 5 corners of it; `PART`: component; `FACE`: the mesh's own number; `VERTICES`.
     """
 
     boxes: Floats
     first: Integers
-    corners: Floats
-    maps: Floats
-    edges: Floats
-    limits: Floats
-    neighbours: Integers
-    flags: Integers
-    parts: Integers
-    faces: Integers
-    rows: Integers
-    vertices: Integers
-    middle: Floats
+    reals: Floats
+    numbers: Integers
+
+
+NORMAL, MAP, EDGES, REACH, CLEARANCE, SLOPE, REALS = 9, 12, 24, 36, 37, 38, 40
+FLAGS, PART, FACE, VERTICES, NUMBERS = 3, 4, 5, 6, 16
 
 
 @kernel
@@ -132,8 +116,8 @@ def depth_of(count: int) -> int:
 
 
 @kernel
-def boxes_of(corners: Floats, first: Integers) -> Floats:
-    """Boxes of all nodes; facets (m, 12) lie in the tree's order."""
+def boxes_of(reals: Floats, first: Integers) -> Floats:
+    """Boxes of all nodes."""
     leaves = len(first) - 1
     boxes = np.empty((2 * leaves - 1, 6))
     for leaf in range(leaves):
@@ -141,8 +125,8 @@ def boxes_of(corners: Floats, first: Integers) -> Floats:
         box[:3], box[3:] = np.inf, -np.inf
         for i in range(first[leaf], first[leaf + 1]):
             for c in range(9):
-                box[c % 3] = min(box[c % 3], corners[i, c])
-                box[3 + c % 3] = max(box[3 + c % 3], corners[i, c])
+                box[c % 3] = min(box[c % 3], reals[i, c])
+                box[3 + c % 3] = max(box[3 + c % 3], reals[i, c])
     for node in range(leaves - 2, -1, -1):
         for k in range(3):
             boxes[node, k] = min(boxes[2 * node + 1, k], boxes[2 * node + 2, k])
@@ -151,64 +135,77 @@ def boxes_of(corners: Floats, first: Integers) -> Floats:
 
 
 @kernel
-def fill(corners: Floats, normals: Floats, middle: Floats, maps: Floats, edges: Floats) -> None:
-    """Fill maps and edges of facets (m, 12) with normals at their corners (m, 3, 3)."""
-    for i in range(len(corners)):
-        n = (corners[i, 9], corners[i, 10], corners[i, 11])
-        a, b, c = corner(corners, i, 0), corner(corners, i, 1), corner(corners, i, 2)
-        for k, p, way in ((0, a, sub(b, a)), (1, b, sub(c, b)), (2, c, sub(a, c))):
-            outward = cross(unit(way), n)
-            edges[i, 3 * k], edges[i, 3 * k + 1], edges[i, 3 * k + 2] = outward
-            edges[i, 9 + k] = dot(outward, p)
-        # Gradients of the barycentric coordinates: exact on slivers too.
+def fill(reals: Floats, normals: Floats) -> None:
+    """Fill in map and edges of facets whose corners have normals (m, 3, 3)."""
+    for i in range(len(reals)):
+        n = flat_normal(reals, i)
+        a, b, c = corner(reals, i, 0), corner(reals, i, 1), corner(reals, i, 2)
         opposite = (sub(c, b), sub(a, c), sub(b, a))
+        for k in range(3):
+            way = opposite[2] if k == 0 else opposite[0] if k == 1 else opposite[1]
+            outward = cross(unit(way), n)
+            at = EDGES + 3 * k
+            reals[i, at], reals[i, at + 1], reals[i, at + 2] = outward
+            reals[i, EDGES + 9 + k] = dot(outward, corner(reals, i, k))
+        # Gradients of the barycentric coordinates: exact on slivers too.
         area = cross(opposite[0], opposite[1])
         size = dot(area, area)
         g0 = times(1.0 / size, cross(area, opposite[0]))
         g1 = times(1.0 / size, cross(area, opposite[1]))
         g2 = times(1.0 / size, cross(area, opposite[2]))
-        local = sub(a, (middle[0], middle[1], middle[2]))
         for k in range(3):
-            slope = add(
-                add(times(normals[i, 0, k], g0), times(normals[i, 1, k], g1)),
-                times(normals[i, 2, k], g2),
-            )
-            maps[i, 3 * k], maps[i, 3 * k + 1], maps[i, 3 * k + 2] = slope
-            maps[i, 9 + k] = normals[i, 0, k] - dot(slope, local)
+            slope = add(times(normals[i, 0, k], g0), times(normals[i, 1, k], g1))
+            slope = add(slope, times(normals[i, 2, k], g2))
+            at = MAP + 3 * k
+            reals[i, at], reals[i, at + 1], reals[i, at + 2] = slope
+            reals[i, MAP + 9 + k] = normals[i, 0, k]
 
 
 @kernel
-def corner(corners: Floats, row: int, k: int) -> Vector:
+def corner(reals: Floats, row: int, k: int) -> Vector:
     """Corner k of a facet."""
-    return corners[row, 3 * k], corners[row, 3 * k + 1], corners[row, 3 * k + 2]
+    return reals[row, 3 * k], reals[row, 3 * k + 1], reals[row, 3 * k + 2]
 
 
 @kernel
-def flat_normal(facets: Facets, row: int) -> Vector:
+def flat_normal(reals: Floats, row: int) -> Vector:
     """Unit normal of a facet."""
-    return facets.corners[row, 9], facets.corners[row, 10], facets.corners[row, 11]
+    return reals[row, NORMAL], reals[row, NORMAL + 1], reals[row, NORMAL + 2]
 
 
 @kernel
-def smooth_normal(facets: Facets, p: Vector, row: int) -> Vector:
+def outward_of(reals: Floats, row: int, k: int) -> Vector:
+    """Unit vector in a facet's plane, square to an edge."""
+    at = EDGES + 3 * k
+    return reals[row, at], reals[row, at + 1], reals[row, at + 2]
+
+
+@kernel
+def smooth_normal(reals: Floats, p: Vector, row: int) -> Vector:
     """Unit normal at a point of a facet, interpolated between the corners'."""
-    m, o = facets.maps, facets.middle
-    x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+    x, y, z = p[0] - reals[row, 0], p[1] - reals[row, 1], p[2] - reals[row, 2]
+    m = MAP
     return unit(
         (
-            m[row, 0] * x + m[row, 1] * y + m[row, 2] * z + m[row, 9],
-            m[row, 3] * x + m[row, 4] * y + m[row, 5] * z + m[row, 10],
-            m[row, 6] * x + m[row, 7] * y + m[row, 8] * z + m[row, 11],
+            reals[row, m] * x + reals[row, m + 1] * y + reals[row, m + 2] * z + reals[row, m + 9],
+            reals[row, m + 3] * x
+            + reals[row, m + 4] * y
+            + reals[row, m + 5] * z
+            + reals[row, m + 10],
+            reals[row, m + 6] * x
+            + reals[row, m + 7] * y
+            + reals[row, m + 8] * z
+            + reals[row, m + 11],
         )
     )
 
 
 @kernel
-def on_facet(corners: Floats, row: int, p: Vector) -> Vector:
+def on_facet(reals: Floats, row: int, p: Vector) -> Vector:
     """Closest point of a facet (C. Ericson: Real-time collision detection, 2005, sec. 5.1.5)."""
-    a = corner(corners, row, 0)
-    b = corner(corners, row, 1)
-    c = corner(corners, row, 2)
+    a = corner(reals, row, 0)
+    b = corner(reals, row, 1)
+    c = corner(reals, row, 2)
     ab, ac, ap = sub(b, a), sub(c, a), sub(p, a)
     d1, d2 = dot(ab, ap), dot(ac, ap)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -244,6 +241,15 @@ def _off_box(boxes: Floats, node: int, p: Vector) -> float:
 
 
 @kernel
+def _lower(reals: Floats, row: int, p: Vector) -> float:
+    """What the squared distance from a facet is at least: over its plane, or beside an edge."""
+    off = abs(dot(flat_normal(reals, row), sub(p, corner(reals, row, 0))))
+    for k in range(3):
+        off = max(off, dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k])
+    return off * off
+
+
+@kernel
 def _within(
     facets: Facets, p: Vector, bound: float, nodes: Integers, offs: Floats
 ) -> tuple[Vector, int]:
@@ -273,7 +279,9 @@ def _within(
             continue
         leaf = node - inner
         for i in range(facets.first[leaf], facets.first[leaf + 1]):
-            q = on_facet(facets.corners, i, p)
+            if _lower(facets.reals, i, p) >= best:
+                continue
+            q = on_facet(facets.reals, i, p)
             gap = sub(p, q)
             off = dot(gap, gap)
             if off < best:
@@ -304,26 +312,26 @@ def search(facets: Facets, points: Floats) -> tuple[Floats, Integers]:
     for i in range(len(points)):
         foot, row = closest(facets, (points[i, 0], points[i, 1], points[i, 2]), nodes, offs)
         feet[i, 0], feet[i, 1], feet[i, 2] = foot
-        face[i] = facets.faces[row]
+        face[i] = facets.numbers[row, FACE]
     return feet, face
 
 
 @kernel
 def beyond_border(facets: Facets, p: Vector, foot: Vector, row: int, least: float) -> bool:
     """Tell whether a point lies beside the mesh; see `TriangleMesh.beyond_border`."""
-    flags = facets.flags[row]
+    reals, flags = facets.reals, facets.numbers[row, FLAGS]
     if flags == 0:
         return False
-    gap, n = sub(p, foot), flat_normal(facets, row)
+    gap, n = sub(p, foot), flat_normal(reals, row)
     if length(sub(gap, times(dot(gap, n), n))) <= least:
         return False
     for k in range(3):
-        a = corner(facets.corners, row, k)
+        a = corner(reals, row, k)
         offset = sub(foot, a)
         if flags & (8 << k) and length(offset) < 1e-6:
             return True
         if flags & (1 << k):
-            edge = sub(corner(facets.corners, row, (k + 1) % 3), a)
+            edge = sub(corner(reals, row, (k + 1) % 3), a)
             along = min(max(dot(offset, edge) / dot(edge, edge), 0.0), 1.0)
             if length(sub(offset, times(along, edge))) < 1e-6:
                 return True
