@@ -12,6 +12,7 @@ from dmpcli.records.record import Record
 from dmpcli.reporting import contact, drawing
 
 _WIDTH, _PANEL, _STRIP, _PATH = 5.9, 1.4, 0.22, 2.2
+_BAR = 0.85
 _LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.62, 0.3, 0.55
 _FORCE, _MEANT, _E, _REST = "#0072B2", "#444444", "#D55E00", "#AAAAAA"
 STATES = {
@@ -59,16 +60,19 @@ def contact_figure(run: Record) -> Figure | None:
     heights = (_PATH, _STRIP, _PANEL, _PANEL)
     bottoms = [foot + sum(heights[:i]) + _GAP * i for i in range(4)]
     figure = drawing.page(_LEFT + _WIDTH + _RIGHT, bottoms[-1] + _PANEL + _TOP)
+    widths = (_WIDTH - _BAR, _WIDTH, _WIDTH, _WIDTH)
     path, strip, shift, force = (
-        drawing.panel(figure, _LEFT, bottom, _WIDTH, height)
-        for bottom, height in zip(bottoms, heights, strict=True)
+        drawing.panel(figure, _LEFT, bottom, width, height)
+        for bottom, width, height in zip(bottoms, widths, heights, strict=True)
     )
+    bar = drawing.panel(figure, _LEFT + _WIDTH - _BAR + 0.15, foot, 0.13, _PATH)
     largest = max(float(np.nanmax(normal[drawn], initial=1.0)), float(meant.max()), 1.0)
     force.plot(t, np.where(drawn, np.nan, normal), color=_REST, lw=1.0)
     force.plot(t, np.where(drawn, normal, np.nan), color=_FORCE, lw=1.2)
     force.plot(t, np.where(drawn, meant, np.nan), color=_MEANT, lw=1.0, ls="-.")
     force.set_ylim(min(0.0, 1.1 * float(np.nanmin(normal))), 1.15 * largest)
-    shift.plot(t, np.where(drawn, np.nan, e), color=_REST, lw=1.0)
+    # On the ways e has no meaning, and the file has 0.
+    shift.plot(t, np.where(drawn | (e == 0.0), np.nan, e), color=_REST, lw=1.0)
     shift.plot(t, np.where(drawn, e, np.nan), color=_E, lw=1.2)
     for name in present:
         spans = _spans(t, states == name)
@@ -83,12 +87,12 @@ def contact_figure(run: Record) -> Figure | None:
         axes.set_xlim(float(t[0]), float(t[-1]))
         drawing.title(axes, title)
         drawing.labels(axes, x="t / s", y=y)
-    _on_path(figure, path, _flat(run, drawn), normal, drawn)
+    _on_path(path, bar, _flat(run, drawn), normal, drawn)
     figure.legend(handles=key, loc="lower center", ncols=3, handlelength=2.6, borderaxespad=0.3)
     return figure
 
 
-def _on_path(figure: Figure, axes: Axes, path: Floats, force: Floats, drawn: Booleans) -> None:
+def _on_path(axes: Axes, bar: Axes, path: Floats, force: Floats, drawn: Booleans) -> None:
     """Draw the path of what was drawn, coloured by the force."""
     both = drawn[1:] & drawn[:-1]
     pieces = np.stack([path[:-1], path[1:]], axis=1)[both]
@@ -97,8 +101,9 @@ def _on_path(figure: Figure, axes: Axes, path: Floats, force: Floats, drawn: Boo
     axes.add_collection(lines)
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale()
-    bar = figure.colorbar(lines, ax=axes, fraction=0.035, pad=0.02)
-    bar.set_label("force / N")
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.colorbar(lines, cax=bar).set_label("force / N")
     drawing.title(axes, "(d)  force along the drawn path")
     drawing.labels(axes, x="along / mm", y="across / mm")
 
