@@ -134,7 +134,14 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+    for option in (
+        "force_setpoint",
+        "stiffness",
+        "delay",
+        "on_contact_loss",
+        "min_contact",
+        "normal_from_force",
+    ):
         if option in said and not presses:
             raise InputError(
                 f"--{option.replace('_', '-')}: nothing presses without --coupling force"
