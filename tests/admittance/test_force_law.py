@@ -89,6 +89,7 @@ def test_at_its_largest_speed_nothing_winds_up():
     assert abs(state.integral) <= 5.0 * PERIOD + 1e-12
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 50.0), st.floats(0.01, 0.3), st.floats(0.5, 20.0), st.floats(-15.0, 15.0))
 def test_when_e_has_ended_what_it_added_decays_and_the_goal_is_reached(k, delay, tau, e):
     """Over random stable gains: e is held, released, and the filter of eq. (10) forgets it."""
