@@ -178,6 +178,31 @@ def euler_of_products(C: Floats, M: Floats) -> Floats:
     return angles.transpose(1, 2, 0)
 
 
+def euler_of_paths(C: Floats, M: Floats) -> Floats:
+    """Return `to_euler_continuous` of the paths C_b(t) M_b(t), by compiled kernels.
+
+    Parameters
+    ----------
+    C : array, shape (B, 1 or T, 3, 3)
+    M : array, shape (1 or B, T, 3, 3)
+
+    Returns
+    -------
+    array, shape (B, T, 3)
+        rad.
+    """
+    from dmpcli.spatial import kernels
+
+    C = np.broadcast_to(C, (max(len(C), len(M)), *C.shape[1:]))
+    path = np.ascontiguousarray(M.reshape(*M.shape[:2], 9).swapaxes(1, 2))
+    out = np.empty((3, len(C), M.shape[1]))
+    special = np.flatnonzero(kernels.euler_of_products(np.ascontiguousarray(C), path, out))
+    if len(special):
+        R = C[special] @ M[special if len(M) > 1 else slice(None)]
+        out[:, special] = _continuous(_angles(np.moveaxis(R, (-2, -1), (0, 1))))
+    return out.transpose(1, 2, 0)
+
+
 def _continuous(angles: tuple[Floats, Floats, Floats]) -> tuple[Floats, ...]:
     """Unwrap angles along their last axis; see `to_euler_continuous`."""
     if angles[0].shape[-1] < 2:

@@ -3,7 +3,7 @@ import pytest
 from tests.faults import world as simulated
 from tests.faults.faults import KINDS
 from tests.faults.planted import PLANTED
-from tests.faults.runs import COMMANDS, draw, generator, run, telling
+from tests.faults.runs import COMMANDS, MOVED, draw, generator, run, telling
 from tests.faults.world import World
 
 FEW = range(12)
@@ -33,14 +33,15 @@ def test_invariants_hold_for_every_kind_of_fault_on_many_a_command(first):
 
 
 def test_these_seeds_put_on_every_kind_of_fault_and_run_every_command():
-    drawn = [draw(generator(seed)) for seed in MORE]
-    assert {command for command, _ in drawn} == set(COMMANDS)
+    drawn = [draw(seed, generator(seed)) for seed in MORE]
+    assert {command for command, _ in drawn} == {MOVED, *COMMANDS}
     assert {kind for _, kinds in drawn for kind in kinds} == set(KINDS)
     assert len({(command, kind) for command, kinds in drawn for kind in kinds}) > 125
 
 
 def test_without_faults_every_command_is_done():
-    for command in ("execute", "execute felt", "execute pressed", "execute file", "record"):
+    commands = ("execute", MOVED, "execute felt", "execute pressed", "execute file", "record")
+    for command in commands:
         finding = run(7, (), command)
         assert (finding.code, finding.wrong) == (0, []), told(finding)
 
