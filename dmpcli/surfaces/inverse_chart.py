@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces import strip_inverse
+from dmpcli.surfaces.mesh_charts import MeshCharts
 from dmpcli.surfaces.plane import PlaneCharts
 from dmpcli.surfaces.surface import Charts, Status
 from dmpcli.surfaces.tangential import NEAR, Sought, solved
@@ -69,7 +71,9 @@ class Inverse:
 def invert(charts: Charts, position: Floats) -> Inverse:
     """Find chart coordinates of positions on or off a surface.
 
-    On planes exactly; elsewhere u and v are sought until the line along the chart's normal meets
+    On planes exactly. Strokes on a mesh, within `strip_inverse.HIGHEST` of it, are found on the
+    nodes of their strips, see there; all others, and those that are not found so as a whole, by a
+    search that lifts what it tries: u and v are sought until the line along the chart's normal meets
     the position, by damped Newton steps on the gap's parts along e_u and e_v. They begin at the
     nearest point of the centre line; where that fails, at the nearest of a grid over the chart,
     then beside neighbours that were found. Turns about a part are counted on along the stroke.
@@ -135,6 +139,52 @@ def _curved(charts: Charts, given: Floats) -> Inverse:
         position[none] = charts.lift(np.zeros((len(given), 1, 3))).position[none]
     low, high = _swing(charts, position)
     at, near = _beside_centre_line(charts, position, low, high)
+    if not isinstance(charts, MeshCharts):
+        return _by_steps(charts, position, over, low, high, at, near)
+    whole = strip_inverse.found(charts, position, at, over.all(axis=1))
+    whole = whole.rows_of(~_jumps(whole.coordinates, position[whole.rows]))
+    rest = np.setdiff1d(np.arange(len(position)), whole.rows)
+    result = _of_strips(whole, position.shape[:2])
+    if len(rest):
+        some = charts.rows(rest), position[rest], over[rest], low[rest], high[rest]
+        part = _by_steps(*some, at[rest], near[rest])
+        result.coordinates[rest], result.axes[rest] = part.coordinates, part.axes
+        result.reached[rest], result.miss[rest] = part.reached, part.miss
+        result.status[rest] = part.status
+    return result
+
+
+def _of_strips(whole: strip_inverse.Found, shape: tuple[int, ...]) -> Inverse:
+    """Put strokes that were found on strips where they belong among others."""
+    result = Inverse(
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, 3, 3), np.nan),
+        np.zeros(shape, dtype=bool),
+        np.full(shape, np.nan),
+        np.full(shape[0], np.int64(Status.DRAWN)),
+    )
+    result.coordinates[whole.rows], result.miss[whole.rows] = whole.coordinates, whole.miss
+    result.axes[whole.rows], result.reached[whole.rows] = whole.axes, True
+    return result
+
+
+def _jumps(coordinates: Floats, position: Floats) -> Booleans:
+    """Tell which strokes (R, T, 3) seem to go on at another turn about the part, shape (R,)."""
+    step = np.linalg.norm(np.diff(coordinates[..., :2], axis=1), axis=-1)
+    way = np.linalg.norm(np.diff(position, axis=1), axis=-1)
+    return np.asarray((step > _JUMP * way + _LEAST_JUMP).any(axis=1))
+
+
+def _by_steps(
+    charts: Charts,
+    position: Floats,
+    over: Booleans,
+    low: Floats,
+    high: Floats,
+    at: Floats,
+    near: Floats,
+) -> Inverse:
+    """Find coordinates by steps with a lift each, from guesses (B, T, 2) that are so near (B, T)."""
     wide = _ARC * near.max(axis=1) + _GRID_STEP
     least, most = _ARC * low, charts.lengths + _ARC * (high - charts.lengths)
     box = np.stack([least, -wide], axis=-1)[:, None], np.stack([most, wide], axis=-1)[:, None]
