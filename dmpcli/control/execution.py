@@ -387,6 +387,8 @@ def record_of(
         facts |= loop.pressing.facts()
         if "coupling" in facts:
             facts["coupling"] = facts["coupling"] | loop.pressing.gains()
+    if loop.goals is not None:
+        facts |= loop.goals.facts()
     if "strokes" in facts:
         facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
     columns = loop.log.columns()

@@ -75,6 +75,11 @@ class ForceTracker:
         """Return the same supervisor and filter on another plan; nothing was felt there yet."""
         return ForceTracker(self.supervisor, self._filter, plan, self._override, self.tally)
 
+    def follow(self, plan: Plan) -> None:
+        """Go on with a plan that is the same up to here, and whose end has moved in its plane."""
+        self._plan = plan
+        self._wanted = _setpoints(plan, self.supervisor.policy.setpoint, self._override)
+
     @property
     def e(self) -> float:
         """Output of the law, mm along the normal."""

@@ -96,6 +96,8 @@ class ExecuteSettings(Settings):
         Positive,
         Option("What the tool file may miss of the reading at rest; torque at 0.1 m.", "N"),
     ] = 1.5
+    # How far from the planned goal one that is told while the stroke runs may lie, mm.
+    goal_range: Positive = 200.0
     # Of a marking pen; a polishing pad wants more.
     force_setpoint: Annotated[
         Positive | None,

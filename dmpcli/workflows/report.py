@@ -34,6 +34,7 @@ from dmpcli.reporting.document import (
 from dmpcli.reporting.ranking import Pupil
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
+from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
 from dmpcli.spatial.trajectory import Trajectory
@@ -268,18 +269,17 @@ def _seen(parts: list[DocumentPart], ground: ReportSurface | None) -> list[Docum
 
 
 def _placed(parts: list[DocumentPart], ground: ReportSurface) -> list[DocumentPart]:
-    """Measure how every trajectory and run lies on the surface."""
+    """Measure how every trajectory and run lies on the surface, those of all files together."""
     reference = reference_of(parts)
-    done = []
-    with progress("measuring", sum(len(part.strokes) for part in parts)) as advance:
-        for part in parts:
-            strokes = []
-            for first in range(0, len(part.strokes), AT_ONCE):
-                some = part.strokes[first : first + AT_ONCE]
-                strokes += placed(some, ground, reference)
-                advance(len(some))
-            done.append(replace(part, strokes=strokes))
-    return done
+    every = [stroke for part in parts for stroke in part.strokes]
+    found: list[ReportedStroke] = []
+    with progress("measuring", len(every)) as advance:
+        for first in range(0, len(every), AT_ONCE):
+            some = every[first : first + AT_ONCE]
+            found += placed(some, ground, reference)
+            advance(len(some))
+    lying = iter(found)
+    return [replace(part, strokes=[next(lying) for _ in part.strokes]) for part in parts]
 
 
 def _placed_apart(parts: list[DocumentPart], grounds: SiteGrounds) -> list[DocumentPart]:
