@@ -73,8 +73,8 @@ def invert(charts: Charts, position: Floats) -> Inverse:
 
     On planes exactly. Strokes on a mesh, within `strip_inverse.HIGHEST` of it, are found on the
     nodes of their strips, see there; all others, and those that are not found so as a whole, by a
-    search that lifts what it tries: u and v are sought until the line along the chart's normal meets
-    the position, by damped Newton steps on the gap's parts along e_u and e_v. They begin at the
+    search that lifts what it tries: u and v are sought until the line along the chart's normal
+    meets it, by damped Newton steps on the gap's parts along e_u and e_v. They begin at the
     nearest point of the centre line; where that fails, at the nearest of a grid over the chart,
     then beside neighbours that were found. Turns about a part are counted on along the stroke.
 
@@ -131,23 +131,14 @@ def _flat(charts: PlaneCharts, position: Floats) -> Inverse:
 
 
 def _curved(charts: Charts, given: Floats) -> Inverse:
-    over = charts.over(given)
-    # A search for what lies beside the surface would lead far off it: neighbours stand in.
-    position = _between(given, over)
-    none = ~over.any(axis=1)
-    if none.any():
-        position[none] = charts.lift(np.zeros((len(given), 1, 3))).position[none]
-    low, high = _swing(charts, position)
-    at, near = _beside_centre_line(charts, position, low, high)
     if not isinstance(charts, MeshCharts):
-        return _by_steps(charts, position, over, low, high, at, near)
-    whole = strip_inverse.found(charts, position, at, over.all(axis=1))
-    whole = whole.rows_of(~_jumps(whole.coordinates, position[whole.rows]))
-    rest = np.setdiff1d(np.arange(len(position)), whole.rows)
-    result = _of_strips(whole, position.shape[:2])
+        return _by_steps(charts, given)
+    whole = strip_inverse.found(charts, given)
+    whole = whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
+    rest = np.setdiff1d(np.arange(len(given)), whole.rows)
+    result = _of_strips(whole, given.shape[:2])
     if len(rest):
-        some = charts.rows(rest), position[rest], over[rest], low[rest], high[rest]
-        part = _by_steps(*some, at[rest], near[rest])
+        part = _by_steps(charts.rows(rest), given[rest])
         result.coordinates[rest], result.axes[rest] = part.coordinates, part.axes
         result.reached[rest], result.miss[rest] = part.reached, part.miss
         result.status[rest] = part.status
@@ -175,16 +166,16 @@ def _jumps(coordinates: Floats, position: Floats) -> Booleans:
     return np.asarray((step > _JUMP * way + _LEAST_JUMP).any(axis=1))
 
 
-def _by_steps(
-    charts: Charts,
-    position: Floats,
-    over: Booleans,
-    low: Floats,
-    high: Floats,
-    at: Floats,
-    near: Floats,
-) -> Inverse:
-    """Find coordinates by steps with a lift each, from guesses (B, T, 2) that are so near (B, T)."""
+def _by_steps(charts: Charts, given: Floats) -> Inverse:
+    """Find coordinates by steps with a lift each."""
+    over = charts.over(given)
+    # A search for what lies beside the surface would lead far off it: neighbours stand in.
+    position = _between(given, over)
+    none = ~over.any(axis=1)
+    if none.any():
+        position[none] = charts.lift(np.zeros((len(given), 1, 3))).position[none]
+    low, high = _swing(charts, position)
+    at, near = _beside_centre_line(charts, position, low, high)
     wide = _ARC * near.max(axis=1) + _GRID_STEP
     least, most = _ARC * low, charts.lengths + _ARC * (high - charts.lengths)
     box = np.stack([least, -wide], axis=-1)[:, None], np.stack([most, wide], axis=-1)[:, None]
