@@ -142,7 +142,11 @@ class MeasurementContext:
 
 
 def measured_parts(
-    batch: BatchFolder, label: str, sight: MeasurementContext, only: Integers | None = None
+    batch: BatchFolder,
+    label: str,
+    sight: MeasurementContext,
+    only: Integers | None = None,
+    threads: int | None = None,
 ) -> Iterator[MeasuredBlock]:
     """Measure the strokes of a batch, in an order that follows its parts.
 
@@ -154,6 +158,8 @@ def measured_parts(
     sight : MeasurementContext
     only : array of int, optional
         Only these rows of the batch.
+    threads : int, optional
+        By default one to a core, up to four.
 
     Raises
     ------
@@ -176,6 +182,8 @@ def measured_parts(
                         some = those[first : first + size]
                         yield partial(_measured, batch, piece, some, t, label, sight, number)
 
+    if threads == 1:
+        return (task() for task in tasks())
     return _in_turn(tasks())
 
 
