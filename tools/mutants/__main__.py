@@ -110,8 +110,7 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     begun = time.monotonic()
     for tests in choice.stages(mutant, known, budget):
         row["tests"] += len(tests)
-        limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
-        verdict = trial.attempt(mutant.file, mutant, tests, limit)
+        verdict = trial.attempt(mutant.file, mutant, {test: known.seconds[test] for test in tests})
         row |= {"killed": verdict.killed, "by": verdict.by, "how": verdict.how}
         if verdict.trouble:
             row["trouble"] = verdict.trouble
@@ -126,8 +125,9 @@ def unharmed(sample: list[operators.Mutant], known: reach.Reach, budget: float) 
     failed = []
     for mutant in sample:
         for tests in choice.stages(mutant, known, budget):
-            limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
-            verdict = trial.attempt(mutant.file, None, tests, limit)
+            verdict = trial.attempt(
+                mutant.file, None, {test: known.seconds[test] for test in tests}
+            )
             if verdict.killed or verdict.trouble:
                 failed.append(f"{verdict.by} {verdict.how}{verdict.trouble}")
     return {"name": "unharmed", "failed": failed}

@@ -17,7 +17,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -31,6 +31,9 @@ from tools.mutants.reach import QUIET
 _MEMORY = 4 * 2**30
 """Bytes beyond those of the parent."""
 
+_LIMIT = 5.0
+"""Seconds that any test, or loading them all, may take beside four times its own."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -40,6 +43,9 @@ class Verdict:
     by: str = ""
     how: str = ""
     trouble: str = ""
+
+
+_LATE = (signal.SIGXCPU, signal.SIGKILL, signal.SIGPROF, signal.SIGALRM)
 
 
 class _Changed(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
@@ -75,10 +81,15 @@ class _Changed(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
 
 
 class _Told:
-    """A pytest plugin: the chosen tests in the given order, and each told as it begins or fails."""
+    """A pytest plugin: the chosen tests in the given order, and each told as it begins or fails.
 
-    def __init__(self, tests: list[str], pipe: int) -> None:
-        self.rank, self.pipe = {name: n for n, name in enumerate(tests)}, pipe
+    A test that takes much longer than it was measured to take ends the process: by the processor's
+    time, or by a clock where it waits.
+    """
+
+    def __init__(self, tests: Mapping[str, float], pipe: int) -> None:
+        self.seconds, self.pipe = tests, pipe
+        self.rank = {name: n for n, name in enumerate(tests)}
 
     def _tell(self, what: str, name: str) -> None:
         os.write(self.pipe, f"{what} {name}\n".encode())
@@ -97,6 +108,9 @@ class _Told:
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         self._tell("begun", nodeid)
+        limit = _LIMIT + 4 * self.seconds[nodeid]
+        signal.setitimer(signal.ITIMER_PROF, limit)
+        signal.setitimer(signal.ITIMER_REAL, 12 * limit)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed:
@@ -108,7 +122,7 @@ class _Told:
 
 
 def _in_child(
-    file: str, mutant: Mutant | None, tests: list[str], seconds: float, pipe: int
+    file: str, mutant: Mutant | None, tests: Mapping[str, float], seconds: float, pipe: int
 ) -> None:
     """Run the tests of one trial; never returns."""
     code = 70
@@ -155,12 +169,14 @@ def _listen(pipe: int, until: float) -> tuple[bytes, bool]:
     return told, False
 
 
-def attempt(file: str, mutant: Mutant | None, tests: list[str], seconds: float) -> Verdict:
-    """Run tests with a module changed (None: as it is), fastest given first, until one fails.
+def attempt(file: str, mutant: Mutant | None, tests: Mapping[str, float]) -> Verdict:
+    """Run tests with a module changed (None: as it is), first given first, until one fails.
 
-    ``seconds`` is the processor time after which the trial is taken for endless, and a kill; six
-    times as much may pass on a clock, for a test that waits for ever.
+    Each test's seconds are what it takes of the processor. One that takes over four times as many
+    and some more is taken for endless, and so is the whole trial: a kill. On a clock twelve times
+    that may pass for one that waits for ever.
     """
+    seconds = _LIMIT + 4.0 * sum(tests.values())
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -189,7 +205,7 @@ def _judged(told: list[str], ended: bool, status: int) -> Verdict:
     if not ended:
         return Verdict(True, by, "time limit")
     if not closed:
-        limit = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
+        limit = os.WIFSIGNALED(status) and os.WTERMSIG(status) in _LATE
         return Verdict(True, by, "time limit" if limit else "process died")
     if closed[-1] in ("0", "5"):
         return Verdict(False)
