@@ -185,20 +185,20 @@ def equivalents() -> dict[str, str]:
 def table(rows: list[Row]) -> str:
     """Rooms by what became of their mutants; the score counts equivalents out."""
     same = equivalents()
-    head = ("room", "mutants", "killed", "by its own room", "equivalent", "survived", "score")
+    head = ("room", "mutants", "killed", "by kept results", "equivalent", "survived", "score")
     lines = ["| " + " | ".join(head) + " |", "|---|" + "--:|" * (len(head) - 1)]
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     for row in rows:
-        own = row["killed"] and choice.room(row["by"] + "/-/-") == row["room"]
+        kept = row["killed"] and choice.is_kept(row["by"])
         what = "killed" if row["killed"] else "equivalent" if row["name"] in same else "survived"
         for room in (row["room"], "all"):
-            counts[room].update([what, "mutants", *(["own"] if own else [])])
+            counts[room].update([what, "mutants", *(["kept"] if kept else [])])
     for room in [*(room for room in ROOMS if room in counts), "all"]:
         n = counts[room]
         score = n["killed"] / max(n["mutants"] - n["equivalent"], 1)
         cells = [
             room,
-            *(str(n[key]) for key in ("mutants", "killed", "own", "equivalent", "survived")),
+            *(str(n[key]) for key in ("mutants", "killed", "kept", "equivalent", "survived")),
         ]
         lines.append("| " + " | ".join([*cells, f"{score:.1%}"]) + " |")
     return "\n".join(lines)
