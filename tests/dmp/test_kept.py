@@ -8,18 +8,26 @@ import pytest
 
 from dmpcli.dmp import (
     agreement,
+    arc_length,
     basis_search,
+    common_timing,
     contact_heights,
     copies,
+    demonstrations,
+    end_conditions,
     feasibility,
+    forced_model,
     inclination,
     learning,
     least_squares,
     noise,
+    paper_preprocessing,
     path_registration,
     pauses,
+    pieces,
     recall,
     reference_paths,
+    regression,
     rollout,
     segmentation,
     sides,
@@ -29,7 +37,9 @@ from dmpcli.dmp import (
     stroke_plane,
     taught_strokes,
     time_base,
+    time_scaling,
     tool_speed,
+    transformation_system,
 )
 from dmpcli.dmp.alignment import align
 from dmpcli.dmp.canonical_system import even_in_time
@@ -39,6 +49,7 @@ from dmpcli.dmp.flat_directions import moving_axes
 from dmpcli.dmp.generalization import charts_of, draw, seen_from
 from dmpcli.dmp.inclination import Inclination
 from dmpcli.dmp.options import FitOptions
+from dmpcli.dmp.path_registration import Correspondence
 from dmpcli.dmp.preprocessing import preprocess
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.tool_speed import Pace
@@ -792,6 +803,145 @@ def forces_learned_and_drawn():
             drawn(skill, PAIRS, PLATE, heights=heights),
             drawn(skill, PAIRS, PLATE, heights=heights, force=4.0),
         ]
+    return found
+
+
+@KEPT.case
+def springs_and_their_answers():
+    found = []
+    for k, d, tau in (([100.0, 100.0], [20.0, 20.0], 2.0), ([50.0, 300.0], [20.0, 8.0], 0.7)):
+        spring = transformation_system.TransformationGains(np.array(k), np.array(d), tau)
+        t = np.array([0.0, 0.1, 0.35, 0.9, 2.0])
+        step = transformation_system.longest_step(spring, 2.0, 40)
+        wide = transformation_system.longest_step(spring, 200.0, 2)
+
+        def pull(s):
+            return np.stack([np.sin(5.0 * s), s**2], axis=-1)
+
+        found += [
+            step,
+            wide,
+            transformation_system.transition(spring, t),
+            transformation_system.homogeneous(spring, t),
+            transformation_system.forced(spring, pull, np.linspace(0.0, 2.0, 9), step),
+        ]
+        basis = even_in_time(12, 2.0, tau, 1.2)
+        one = transformation_system.TransformationGains(np.array(k[1:]), np.array(d[1:]), tau)
+        ends = end_conditions.end_responses(one, basis, 1.2, 2.0)
+        paths = np.cos(np.outer(np.linspace(0, 1, 30), np.arange(1.0, 7.0)))
+        moves = end_conditions.end_moves(paths, ends)
+        weights = np.sin(np.arange(24.0)).reshape(2, 12)
+        found += [
+            ends,
+            moves,
+            end_conditions.start_move(paths, np.linspace(1, 0, 30), 12),
+            end_conditions.corrections(weights, np.ones((2, 2)), ends, moves),
+        ]
+    found += [transformation_system.quadrature(n) for n in (1, 2, 6)]
+    found.append(transformation_system.critical(np.array([20.0, 3.0])))
+    return found
+
+
+@KEPT.case
+def weights_by_regression():
+    found = []
+    for count in (5, 30, 90):
+        basis = even_in_time(count, 6.0, 3.0, 1.0)
+        s = np.exp(-np.linspace(0.0, 6.0, 400) / 3.0)
+        forcing = np.column_stack([np.sin(9 * s), s**2 - 0.3])
+        found += [regression.lwr(basis, s, s, forcing), regression.ridge(basis, s, s, forcing)]
+        if basis.banded:
+            banded = regression.BandedRegression(basis, s)
+            found += [banded.fit("lwr", forcing, n) for n in (1, 3)]
+            found.append(banded.fit("ridge", forcing))
+        model = forced_model.forced_model(count, 100.0, 20.0, 0.5, 1.0, "spacing")
+        found += [
+            model.samples,
+            model.a,
+            model.b,
+            model.c,
+            model.end,
+            model.end_responses,
+            model.end_moves,
+            model.start_move,
+            model.response(np.ones((1, count))),
+        ]
+    return found
+
+
+@KEPT.case
+def splines_by_least_squares():
+    found = []
+    x = np.cumsum(random().normal(size=(900, 2)), axis=0)
+    for design in (
+        least_squares.uniform(300, 20),
+        least_squares.uniform(900, 60),
+        least_squares.uniform(300, 7, 0.3, 0.02),
+        least_squares.Design(300, 0.0, 0.05, np.array([0.0, 1, 3, 4, 8, 15]), False),
+        least_squares.Design(900, 0.0, 0.05, np.linspace(0.0, 45.0, 70), False),
+    ):
+        y = x[: design.count]
+        c = design.coefficients(y)
+        found += [
+            design.gram,
+            design.right(y),
+            c,
+            design.values(c),
+            design.residual(y),
+            design.intervals,
+            design.size,
+            design.knots,
+        ]
+    return found
+
+
+@KEPT.case
+def laws_of_time():
+    t = np.linspace(0.0, 4.0, 41)
+    laws = [
+        arc_length.monotone(t, 50.0 * (t / 4.0) ** p, 12.5 * p * (t / 4.0) ** (p - 1))
+        for p in (1.0, 1.4, 2.0)
+    ]
+    found = [laws, [law.time(np.linspace(-1.0, 51.0, 30)) for law in laws]]
+    found += [law.place(np.linspace(0.0, 4.0, 30)) for law in laws]
+    bent = Correspondence().pinned({0.3: 0.4, 0.7: 0.75})
+    found.append(common_timing.mean_law(laws, [Correspondence(), bent, Correspondence()], 60))
+    found.append(common_timing.running_on(laws[1], [0.3, 0.8]))
+    for ease in ((0.0, 0.0), (0.5, 0.2), (2.0, 2.0)):
+        found.append(time_scaling.timing(3.03, 25.0, 6.0, 3.0, *ease))
+        found.append(time_scaling.eased(t, ease[0]))
+    x = named("hesitation").position
+    [rest] = demonstrations.rests_of([ComparedPath(8.0, x)] * 3).held[0].values()
+    path = ComparedPath(8.0, x)
+    for cuts, held in (((), {}), ([rest], {}), ((), {0: rest})):
+        moving = demonstrations.of_stroke(path, cuts, held)
+        found += [moving.duration, moving.law, moving.stays, moving.skipped]
+        found.append(moving.at(np.linspace(0.0, 1.0, 20)))
+    return found
+
+
+@KEPT.case
+def parts_between_others():
+    stroke = np.linspace(0.0, 10.0, 301)
+    x = np.column_stack([30.0 * stroke, 10 * np.sin(stroke), 0 * stroke])
+    outside = (np.sin(2.0 * stroke) > 0.7) | ((stroke > 7.0) & (stroke < 7.1))
+    found = []
+    for least in (0.0, 20.0, 60.0):
+        spans = pieces.inside(stroke, x, outside, least)
+        path = pieces.Path(stroke, x)
+        found += [spans, [path.within(s) for s in spans]]
+        for pace in (None, Pace(50.0)):
+            found.append(pieces.retimed(spans, stroke[::3], path, pace, 20.0, 1.3, (0.2, 0.0)))
+    return found
+
+
+@KEPT.case
+def demonstrations_prepared_as_the_paper_has_it():
+    found = []
+    for name in ("idle", "noisy", "aslant", "nearly closed"):
+        for options in ({}, {"basis": 20}, {"cutoff": 3.0, "trim": False}):
+            p = paper_preprocessing.prepare(named(name), FitOptions(learning="paper", **options))
+            found.append([p.signal, p.frame, p.closed, p.removed, p.trimmed, p.cutoff])
     return found
 
 

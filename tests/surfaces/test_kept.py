@@ -1,5 +1,6 @@
 """Meshes, charts, regions and poses of many kinds: results that are kept, see `tests/kept.py`."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,31 +11,39 @@ import trimesh
 from dmpcli.records import file_io
 from dmpcli.records.mesh import decode
 from dmpcli.spatial import rotations
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import (
     chordal_error,
     extent,
     frame_smoothing,
     geodesic_search,
+    geodesic_shooting,
+    last_check,
     mesh_repair,
+    mistouched,
     pose_bound,
     pose_search,
     registration,
     sampled_chart,
     sharp_edges,
+    straightest_geodesics,
 )
 from dmpcli.surfaces.border_margin import BorderMargin
-from dmpcli.surfaces.conditioning import conditioning_of
+from dmpcli.surfaces.conditioning import conditioning_of, radius_of
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.flat_regions import flattened
 from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.keep_out import enclosed
+from dmpcli.surfaces.last_check import Feet
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.mesh_regions import mesh_region
 from dmpcli.surfaces.open_patches import open_patches
 from dmpcli.surfaces.placement import box, slips
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.polygons import cut, too_large
+from dmpcli.surfaces.slit_crossings import crossed
 from dmpcli.surfaces.sphere import Sphere
+from dmpcli.surfaces.thin_walls import mistaken
 from dmpcli.surfaces.topology import Topology
 from tests.kept import Kept
 from tests.records.meshes import grid
@@ -464,6 +473,117 @@ def grids_of_heights():
     at = mesh.closest(start).position, mesh.closest(goal).position
     charts = mesh.charts(*at)
     return [charts.lift(wavy(charts, w)) for w in (2.0, 12.0, 30.0, 60.0)]
+
+
+def right(count=60):
+    """A stroke that lies as it should on a flat sheet."""
+    mesh = folded(0.0)
+    coordinates = fields.strokes([60.0], count, height=20.0)
+    position = coordinates + [-30.0, 1.0, 0.0]
+    up = np.broadcast_to([0.0, 0.0, 1.0], position.shape)
+    face = mesh.closest(position).face
+    outside = np.zeros(face.shape, dtype=bool)
+    return mesh, Feet(coordinates, position, up, face, np.ones(face.shape), outside)
+
+
+@KEPT.case
+def strokes_that_are_wrong():
+    mesh, feet = right()
+    start, step = np.array([[-30.0, 1.0, 0.0]]), np.array([[60.0, 0.0, 0.0]])
+    found = []
+    for off in (0.0, 0.05, 0.5, 1.2, 3.0):
+        for axis in range(3):
+            for part_ in (slice(0, 1), slice(20, 40), slice(59, 60)):
+                moved = feet.position.copy()
+                moved[0, part_, axis] += off
+                one = replace(feet, position=moved)
+                found += [last_check.refusals(mesh, one, start, start + step, step)]
+                found += [last_check.unsound(mesh, one)]
+    for lean in (0.2, 0.8, 1.2):
+        normal = np.broadcast_to([0.0, np.sin(lean), np.cos(lean)], feet.position.shape)
+        found += [
+            last_check.refusals(mesh, replace(feet, normal=normal), start, start + step, step)
+        ]
+    for size in (40.0, 59.98, 59.995, 60.0):
+        one = last_check.shorter_than_chord(mesh, start, start + step, np.array([size]))
+        found.append(one)
+    return found
+
+
+@KEPT.case
+def poses_sought():
+    ball = EXACT["sphere"]
+
+    def closest(points):
+        at = ball.closest(points)
+        return at.position, at.normal
+
+    mesh = part("angle_block")
+
+    def on_part(points):
+        at = mesh.closest(points)
+        return at.position, at.normal
+
+    points, normals = touched(mesh, 14)
+    starts = pose_search.near(
+        rotations.exp(np.array([0.02, 0.03, -0.01])), np.ones(3), points.mean(axis=0), 6, 2.0, 0.1
+    )
+    best, squares = pose_search.descend(points, on_part, starts)
+    found = [
+        pose_search.signed(10.0 * rng().normal(size=(20, 3)), closest),
+        best.rotation,
+        best.position,
+        squares,
+    ]
+    few, squares = pose_search.descended(points, on_part, starts, 2)
+    found += [few.rotation, few.position, squares]
+    bad = points.copy()
+    bad[3] += 2.0 * normals[3]
+    first = Pose(best.position[:1], best.rotation[:1])
+    steady = mistouched.steadied(bad, on_part, first)
+    conditioning = conditioning_of(points, normals, 14)
+    found += [
+        steady.rotation,
+        steady.position,
+        pose_bound.displacement(best, first, mesh.V[:20]),
+        pose_bound.ellipsoid(conditioning, 14, 0.3, 8, mesh.V[:20]),
+    ]
+    beside, squares = pose_bound.beside(points, on_part, first, conditioning, mesh.V[:20], 0.5)
+    return [*found, beside.rotation, beside.position, squares, radius_of(points)]
+
+
+@KEPT.case
+def goals_behind_walls():
+    made = trimesh.creation.box((60.0, 40.0, 1.2)).subdivide().subdivide()
+    wall = Mesh(np.array(made.vertices), np.array(made.faces))
+    x = np.linspace(-25.0, 25.0, 12)
+    origin = np.tile([-20.0, 3.0, 0.6], (12, 1))
+    goal = np.column_stack([x, 0.2 * x, 0.6 * np.where(np.arange(12) % 3, -1.0, 1.0)])
+    found = [
+        mistaken(wall, origin, goal, np.full(12, off), np.full(12, size))
+        for off in (0.0, 0.25, 0.35, 1.0)
+        for size in (20.0, 50.0, 90.0)
+    ]
+    return [*found, wall.slits.near(goal, np.full(12, 2.0)), crossed(wall, goal[None])]
+
+
+@KEPT.case
+def lines_shot():
+    found = []
+    for name in ("saddle", "bumpy", "ball", "folded"):
+        mesh = meshes()[name]
+        start, goal = pairs(mesh, 4, 15.0)
+        at = mesh.closest(start)
+        part_ = mesh.components[at.face]
+        aim = geodesic_shooting.take_aim(start, at.normal, goal, np.ones((4, 1)), part_)
+        found += [
+            aim,
+            geodesic_shooting.by_steps(mesh, aim),
+            geodesic_shooting.by_facets(mesh, aim),
+            geodesic_shooting.corrected(mesh, aim),
+        ]
+        found.append(straightest_geodesics.walk(mesh, start, aim.direction, np.full(4, 20.0)))
+    return found
 
 
 @pytest.mark.parametrize("name", KEPT.cases)

@@ -21,10 +21,11 @@ import subprocess
 import sys
 import time
 import tomllib
+import traceback
 from pathlib import Path
 from typing import Any
 
-from tools.mutants import choice, operators, reach, trial
+from tools.mutants import choice, operators, reach, trial, warm
 
 ROOMS = ("dmp", "admittance", "surfaces", "metrics", "planning", "control")
 OTHERS = ("records", "reporting", "calibration")
@@ -111,6 +112,8 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     for tests in choice.stages(mutant, known, budget):
         row["tests"] += len(tests)
         verdict = trial.attempt(mutant.file, mutant, {test: known.seconds[test] for test in tests})
+        if verdict.misfit:
+            return {"misfit": True}
         row |= {"killed": verdict.killed, "by": verdict.by, "how": verdict.how}
         if verdict.trouble:
             row["trouble"] = verdict.trouble
@@ -145,10 +148,11 @@ def run(
         worker = os.fork()
         if worker == 0:
             try:
-                for mutant in left[job::jobs]:
-                    _keep(kept, judged(mutant, known, budget))
+                _work(left[job::jobs], known, budget, kept)
                 if job == 0 and "unharmed" not in done:
                     _keep(kept, unharmed(mutants[:5], known, budget))
+            except BaseException:
+                traceback.print_exc()
             finally:
                 os._exit(0)
         workers.append(worker)
@@ -161,6 +165,15 @@ def run(
     if rows["unharmed"]["failed"]:
         raise SystemExit(f"fail without a mutant too: {rows['unharmed']['failed']}")
     return [rows[name] for name in names[1:]]
+
+
+def _work(mutants: list[operators.Mutant], known: reach.Reach, budget: float, kept: Path) -> None:
+    """Judge mutants one after the other, each where it can be judged the soonest."""
+    anew = warm.apart(lambda number: judged(mutants[number], known, budget))
+    warm.load(test.partition("::")[0] for test in known.seconds)
+    for number, mutant in enumerate(mutants):
+        row = judged(mutant, known, budget) if warm.fits(mutant) else anew(number)
+        _keep(kept, anew(number) if "misfit" in row else row)
 
 
 def _keep(kept: Path, row: Row) -> None:

@@ -25,6 +25,7 @@ from types import CodeType, ModuleType
 import hypothesis
 import pytest
 
+from tools.mutants import warm
 from tools.mutants.operators import Mutant
 from tools.mutants.reach import QUIET
 
@@ -37,12 +38,16 @@ _LIMIT = 5.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a test failed, which one, and how; ``trouble`` is a fault of the trial itself."""
+    """Whether a test failed, which one, and how; ``trouble`` is a fault of the trial itself.
+
+    A misfit is a mutant that could not be put in place of what is loaded.
+    """
 
     killed: bool
     by: str = ""
     how: str = ""
     trouble: str = ""
+    misfit: bool = False
 
 
 _LATE = (signal.SIGXCPU, signal.SIGKILL, signal.SIGPROF, signal.SIGALRM)
@@ -139,8 +144,13 @@ def _in_child(
         path = Path(file).resolve()
         tree = mutant.placed() if mutant else ast.parse(path.read_text(encoding="utf-8"))
         changed = compile(tree, str(path), "exec")
-        name = ".".join(Path(file).with_suffix("").parts)
-        sys.meta_path.insert(0, _Changed(name, path, changed))
+        if mutant and warm.fits(mutant):
+            if not warm.put(changed):
+                os.write(pipe, b"misfit\n")
+                os._exit(0)
+        else:
+            name = ".".join(Path(file).with_suffix("").parts)
+            sys.meta_path.insert(0, _Changed(name, path, changed))
         scratch = tempfile.mkdtemp(prefix="mutant")
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         options = [*QUIET, "--tb=no", "-x", f"--basetemp={scratch}/t"]
@@ -193,6 +203,8 @@ def attempt(file: str, mutant: Mutant | None, tests: Mapping[str, float]) -> Ver
 
 
 def _judged(told: list[str], ended: bool, status: int) -> Verdict:
+    if "misfit" in told:
+        return Verdict(False, misfit=True)
     begun = [line.partition(" ")[2] for line in told if line.startswith("begun ")]
     by = begun[-1] if begun else "loading the tests"
     for line in told:
