@@ -53,6 +53,7 @@ from dmpcli.dmp.path_registration import Correspondence
 from dmpcli.dmp.preprocessing import preprocess
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.tool_speed import Pace
+from dmpcli.errors import DmpError
 from dmpcli.spatial import rotations
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.cylinder import Cylinder
@@ -942,6 +943,82 @@ def demonstrations_prepared_as_the_paper_has_it():
         for options in ({}, {"basis": 20}, {"cutoff": 3.0, "trim": False}):
             p = paper_preprocessing.prepare(named(name), FitOptions(learning="paper", **options))
             found.append([p.signal, p.frame, p.closed, p.removed, p.trimmed, p.cutoff])
+    return found
+
+
+def refused(call):
+    """Name what a call is refused with; nothing where it goes through."""
+    try:
+        call()
+    except (DmpError, ValueError) as error:
+        return type(error).__name__
+    return ""
+
+
+@KEPT.case
+def what_is_refused():
+    plain, turning = paper_stroke(), paper_stroke(turning=True)
+    bare = replace(plain, rotation=None)
+    still = replace(bare, position=0.0 * bare.position)
+    pressed = replace(plain, contact_force=np.tile([0.0, 0.0, -3.0], (len(plain.t), 1)))
+
+    def fit(strokes, **options):
+        return lambda: learning.fit(strokes, FitOptions(**options))
+
+    calls = [
+        fit([plain, bare]),
+        fit([bare, plain, turning]),
+        fit([plain, turning, bare]),
+        fit([still]),
+        fit([still], learning="paper"),
+        fit([plain], force_profile=True),
+        fit([pressed], force_profile=True),
+        fit([plain], start=20.0),
+        fit([plain], until=0.0),
+        fit([plain], start=2.0, until=2.01),
+        fit([few_of(plain, 3)]),
+        fit([few_of(plain, 8)]),
+        fit([plain, circle()]),
+        fit([circle(), circle()]),
+    ]
+    calls += [
+        fit([plain], learning="paper", **one)
+        for one in (
+            {"normal": (0, 0, 1.0)},
+            {"tolerance": 1.0},
+            {"passes": 2},
+            {"align": "time"},
+            {},
+        )
+    ]
+    return [refused(call) for call in calls]
+
+
+def few_of(stroke, count):
+    rows = np.linspace(0, len(stroke.t) - 1, count).astype(int)
+    R = None if stroke.rotation is None else stroke.rotation[rows]
+    return Trajectory(stroke.t[rows], stroke.position[rows], R)
+
+
+@KEPT.case
+def forces_of_springs():
+    from dmpcli.dmp.force_profile import unsprung
+
+    force = np.concatenate([np.linspace(-1.0, 6.0, 80), np.linspace(6.0, 0.0, 40)])
+    found = [unsprung(-force / k + lift, force) for k in (0.5, 2.0) for lift in (0.0, 4.0)]
+    quality = basis_search.Quality(0.1, 0.4, 0.2, (50.0, 49.0), 0.01)
+    found += [
+        learning.with_lost(quality, lost) for lost in ([], [(0.2, 0.1)], [(0.0, 0.9), (0.3, 0)])
+    ]
+    heights = contact_heights.ContactHeights(0.5, 0.2, 0.1, 0.0, 1.0, 3.0)
+    w = np.linspace(-2.0, 4.0, 60)
+    found += [
+        heights.drawn(w),
+        heights.deep,
+        contact_heights.pressed(w, 4.0, heights),
+        contact_heights.pressed(w, w + 3.0, heights),
+        contact_heights.pressed(w, None, heights),
+    ]
     return found
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dmpcli.errors import DmpError
 from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import deceleration, plan, preflight, transfers
@@ -147,6 +148,20 @@ def ramps_and_splines():
     for index in (0.0, 2.25, 28.9):
         near, share = window(index, 30)
         found += [near, share, between(y[near], share)]
+    return found
+
+
+@KEPT.case
+def what_no_plan_is_made_of():
+    a = stroke(2.0, 50.0, 0.3, normal=UP)
+    found = []
+    for change in ({"t": a.t * 1e5}, {"normal": None}, {"rotation": None}, {"force": a.t}):
+        for start in poses()[:2]:
+            try:
+                one = plan.make(replace(a, **change), 0.02, 1.0, WIDE, start, 25.0)
+                found += [len(one), one.oriented, one.normal is None, one.force]
+            except DmpError as error:
+                found.append(type(error).__name__)
     return found
 
 

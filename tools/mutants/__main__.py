@@ -149,8 +149,6 @@ def run(
         if worker == 0:
             try:
                 _work(left[job::jobs], known, budget, kept)
-                if job == 0 and "unharmed" not in done:
-                    _keep(kept, unharmed(mutants[:5], known, budget))
             except BaseException:
                 traceback.print_exc()
             finally:
@@ -169,11 +167,25 @@ def run(
 
 def _work(mutants: list[operators.Mutant], known: reach.Reach, budget: float, kept: Path) -> None:
     """Judge mutants one after the other, each where it can be judged the soonest."""
-    anew = warm.apart(lambda number: judged(mutants[number], known, budget))
-    warm.load(test.partition("::")[0] for test in known.seconds)
-    for number, mutant in enumerate(mutants):
-        row = judged(mutant, known, budget) if warm.fits(mutant) else anew(number)
-        _keep(kept, anew(number) if "misfit" in row else row)
+    outer = [mutant for mutant in mutants if not mutant.in_function]
+
+    def here(number: int) -> Row:
+        if number < 0:
+            return unharmed(outer[:2], known, budget)
+        return judged(mutants[number], known, budget)
+
+    anew = warm.apart(here)
+
+    def work() -> None:
+        for number, mutant in enumerate(mutants):
+            row = here(number) if warm.fits(mutant) else anew(number)
+            _keep(kept, anew(number) if "misfit" in row else row)
+        if "unharmed" not in {row["name"] for row in _rows(kept)}:
+            row = unharmed([mutant for mutant in mutants if mutant.in_function][:8], known, budget)
+            _keep(kept, row | {"failed": row["failed"] + anew(-1)["failed"]})
+
+    files = [test.partition("::")[0] for test in known.seconds]
+    warm.within(files, [*reach.QUIET, "--tb=no"], work)
 
 
 def _keep(kept: Path, row: Row) -> None:

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, ModuleType
 
-import hypothesis
 import pytest
 
 from tools.mutants import warm
@@ -100,11 +99,7 @@ class _Told:
         os.write(self.pipe, f"{what} {name}\n".encode())
 
     def pytest_sessionstart(self) -> None:
-        once = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
-        hypothesis.settings.register_profile(
-            "mutants", hypothesis.settings.default, phases=once, report_multiple_bugs=False
-        )
-        hypothesis.settings.load_profile("mutants")
+        warm.take_one_example()
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -144,17 +139,20 @@ def _in_child(
         path = Path(file).resolve()
         tree = mutant.placed() if mutant else ast.parse(path.read_text(encoding="utf-8"))
         changed = compile(tree, str(path), "exec")
-        if mutant and warm.fits(mutant):
-            if not warm.put(changed):
-                os.write(pipe, b"misfit\n")
-                os._exit(0)
-        else:
-            name = ".".join(Path(file).with_suffix("").parts)
-            sys.meta_path.insert(0, _Changed(name, path, changed))
         scratch = tempfile.mkdtemp(prefix="mutant")
+        told = _Told(tests, pipe)
+        if warm.loaded() and (mutant is None or warm.fits(mutant)):
+            if mutant and not warm.put(changed):
+                os.write(pipe, b"misfit\n")
+            elif failed := warm.run(tests, scratch, told.pytest_runtest_logstart):
+                os.write(pipe, f"failed {failed}\n".encode())
+            code = 0
+            return
+        name = ".".join(Path(file).with_suffix("").parts)
+        sys.meta_path.insert(0, _Changed(name, path, changed))
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         options = [*QUIET, "--tb=no", "-x", f"--basetemp={scratch}/t"]
-        code = int(pytest.main([*options, *files], plugins=[_Told(tests, pipe)]))
+        code = int(pytest.main([*options, *files], plugins=[told]))
     except SyntaxError:
         os.write(pipe, b"unloaded the module itself\n")
     except BaseException as error:

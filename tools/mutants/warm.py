@@ -10,7 +10,6 @@ tried in processes that load everything anew.
 import contextlib
 import functools
 import gc
-import importlib
 import os
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
@@ -20,22 +19,55 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
 
+import hypothesis
+import pytest
+from _pytest.runner import runtestprotocol
+
 from tools.mutants.operators import Mutant
 
 Key = tuple[str, str, int]
 """Which function: its file, its qualified name and its first line."""
 
 _functions: dict[Key, list[FunctionType]] = defaultdict(list)
+_items: dict[str, pytest.Item] = {}
 
 
 Judging = Callable[[int], dict[str, Any]]
 """Judges the mutant of a number, here or elsewhere."""
 
 
-def load(files: Iterable[str]) -> None:
-    """Load files of tests and with them the package, and remember where every function is."""
-    for file in sorted(set(files)):
-        importlib.import_module(".".join(Path(file).with_suffix("").parts))
+def take_one_example() -> None:
+    """Let hypothesis look for one failing example, and not make it small."""
+    once = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
+    hypothesis.settings.register_profile(
+        "mutants", hypothesis.settings.default, phases=once, report_multiple_bugs=False
+    )
+    hypothesis.settings.load_profile("mutants")
+
+
+class _Session:
+    """A pytest plugin: what is to be done once all tests are collected, instead of running them."""
+
+    def __init__(self, work: Callable[[], None]) -> None:
+        self.work = work
+
+    def pytest_sessionstart(self) -> None:
+        take_one_example()
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        _items.update((item.nodeid, item) for item in session.items)
+        _remember()
+        self.work()
+        return True
+
+
+def within(files: Iterable[str], options: list[str], work: Callable[[], None]) -> None:
+    """Do some work where files of tests, and with them the package, are loaded and collected."""
+    pytest.main([*options, *sorted(set(files))], plugins=[_Session(work)])
+
+
+def _remember() -> None:
+    """Note where every function of the package is, and forget what was made by the way."""
     gc.collect()
     here = f"{Path.cwd()}/dmpcli/"
     for found in gc.get_objects():
@@ -45,6 +77,20 @@ def load(files: Iterable[str]) -> None:
         elif isinstance(found, FunctionType) and found.__code__.co_filename.startswith(here):
             _functions[_key(found.__code__)].append(found)
     gc.freeze()
+
+
+def run(tests: Iterable[str], scratch: str, begun: Callable[[str], None]) -> str:
+    """Run collected tests in this order until one fails; its name, or nothing. In a child only."""
+    chosen = [_items[name] for name in tests if name in _items]
+    if chosen:
+        factory = chosen[0].config._tmp_path_factory  # type: ignore[attr-defined]
+        factory._given_basetemp, factory._basetemp = Path(scratch) / "t", None
+    for item, following in zip(chosen, [*chosen[1:], None], strict=True):
+        begun(item.nodeid)
+        reports = runtestprotocol(item, log=False, nextitem=following)
+        if any(report.failed for report in reports):
+            return item.nodeid
+    return ""
 
 
 def _key(code: CodeType) -> Key:
@@ -59,9 +105,14 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
             yield from _codes(inner)
 
 
+def loaded() -> bool:
+    """Whether this process has the package and its tests loaded."""
+    return bool(_items)
+
+
 def fits(mutant: Mutant) -> bool:
     """Whether a mutant may be put in place of functions that are loaded."""
-    return bool(_functions) and mutant.in_function
+    return loaded() and mutant.in_function
 
 
 def put(changed: CodeType) -> bool:
