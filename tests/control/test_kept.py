@@ -9,6 +9,8 @@ import pytest
 from dmpcli.admittance import model
 from dmpcli.admittance.force_law import LawState
 from dmpcli.control import chatter, guarded_motion
+from dmpcli.control.contact_policy import ContactPolicy
+from dmpcli.control.cycle import StopLimits
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.control.loop_timing import LoopTiming
 from dmpcli.control.plan_cursor import PlanCursor
@@ -235,6 +237,11 @@ def forces_that_chatter():
     for k in range(50):
         timing.add(k, k + 1e-3 * (k % 7), k + 2e-3 * (k % 5) + 8e-3, k + 0.02)
     return [*found, timing.facts()]
+
+
+@KEPT.case
+def what_is_meant_where_nothing_is_said():
+    return [ContactPolicy(5.0), StopLimits(1.0, 2.0, 3.0, 4.0), LawState(), model.Bounds()]
 
 
 @pytest.mark.parametrize("name", KEPT.cases)

@@ -45,7 +45,9 @@ from dmpcli.dmp.alignment import align
 from dmpcli.dmp.canonical_system import even_in_time
 from dmpcli.dmp.demonstrations import ComparedPath
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
+from dmpcli.dmp.fit_result import Fit, ReproductionMeasures
 from dmpcli.dmp.flat_directions import moving_axes
+from dmpcli.dmp.force_profile import ForceProfile
 from dmpcli.dmp.generalization import charts_of, draw, seen_from
 from dmpcli.dmp.inclination import Inclination
 from dmpcli.dmp.options import FitOptions
@@ -1020,6 +1022,30 @@ def forces_of_springs():
         contact_heights.pressed(w, None, heights),
     ]
     return found
+
+
+@KEPT.case
+def what_is_meant_where_nothing_is_said():
+    found = [
+        FitOptions(),
+        GeneralizeOptions(),
+        Pace(1.0),
+        ComparedPath(1.0, np.zeros(1)),
+        basis_search.Tolerance(1.0),
+        Correspondence(),
+        agreement.Doubt(0, "shape", 1.0),
+    ]
+    zeros = np.zeros(2)
+    found += [
+        noise.Noise(np.eye(2), zeros),
+        ForceProfile(zeros, 1.0, 0.0, 0.0, 0.0),
+        Fit(None, [], []),
+        ReproductionMeasures(zeros, zeros, 0.0, 0.0, 0.0),
+    ]
+    for depth, band in ((1.0, 0.5), (0.4, 0.5), (0.5, 0.5), (1.0, 0.0)):
+        found.append(contact_heights.ContactHeights(band, 0.0, 0.0, depth, 1.0, 0.0).deep)
+    t = np.linspace(0.0, 1.0, 9)
+    return [*found, [demonstrations.through(t[:n], t[:n, None]).k for n in range(2, 10)]]
 
 
 @pytest.mark.parametrize("name", KEPT.cases)
