@@ -9,7 +9,9 @@ walked again, at most `_PASSES` times, until these no longer change.
 Which u, v a foot has on an edge: closest points of all that stands over a convex edge lie on it, so
 that several u, v lead to one foot there. The one over the facet that the search names is taken. The
 others lie beside it by no more than the spline's height over the mesh times the angle at the edge,
-and every one of them leads to the position.
+and every one of them leads to the position. Where the spline runs under a convex edge, or over a
+concave one, none leads to points of the edge; such strokes are left to `tangential`, which comes as
+near as it can.
 """
 
 from collections.abc import Iterator
