@@ -31,6 +31,7 @@ from benchmarks import force_runs, force_stability, force_work
 from benchmarks.force_cases import PEN, ROOT, TABLES, Case
 
 KEPT = ROOT / "out" / "force-runs.jsonl"
+_SAID = 72  # of why a run ended, characters
 HEAD = (
     "contact, % | mean off, N | RMS, N | peak, N | landing, N | wave, mm | off, mm | k̂ off, % "
     "| seeds | ended"
@@ -106,7 +107,7 @@ def row(table: str, case: Case, results: list[dict[str, Any]]) -> str:
     if table == "stiffness":
         name += f", static {static(case):.2f}"
     drawn = [one for one in results if "contact" in one]
-    said = sorted({one["why"].splitlines()[0] for one in results if one["why"]})[:1]
+    said = sorted({one["why"].splitlines()[0][:_SAID] for one in results if one["why"]})[:1]
     stopped = sum(bool(one["why"]) for one in results)
     ended = f"{stopped} × {said[0]}" if said else "done"
     ended += "; ".join(["", *more(results)])
@@ -118,6 +119,8 @@ def row(table: str, case: Case, results: list[dict[str, Any]]) -> str:
         values = [scale * one[key] for one in drawn if key in one]
         if not values:
             return "–"
+        if len(values) == 1:
+            return f"{values[0]:{form}}"
         return f"{of(values):{form}} ({np.median(values):{form}})"
 
     def furthest(values: list[float]) -> float:

@@ -34,7 +34,7 @@ class Case:
         Whether it presses as it was taught, from 3 to 8 to 4 N, instead of evenly.
     arm : {'ec66', 'ur5e'}
     brief : bool
-        Whether only a tenth of the stroke is drawn, within 2 s: the landing is what counts.
+        Whether the goal is ten times as near, in 4 s and ways: the landing is what counts.
     """
 
     name: str

@@ -80,9 +80,9 @@ def planned(
         START + (0.1 if brief else 1.0) * (GOAL - START),
         shapes[plan],
         orientation="surface",
-        duration=1.0 if brief else 10.0,
-        ease_in=0.5 if brief else 2.0,
-        ease_out=0.5 if brief else 2.0,
+        duration=4.0 if brief else 10.0,
+        ease_in=1.0 if brief else 2.0,
+        ease_out=1.0 if brief else 2.0,
         offset=offset,
     )
     assert isinstance(drawn, dmpcli.Trajectory)
@@ -166,7 +166,7 @@ def measured(
         found |= regained(felt, np.asarray(log.columns["contact"])[cycle[on]], step)
     tip = np.column_stack([true[key] for key in "xyz"])[on]
     wanted = onto(case, said, drawn)
-    if wanted is not None:
+    if wanted is not None and not case.brief:
         tree = cKDTree(finely(wanted))
         off, _ = tree.query(tip[felt > 0.0])
         heights = [stroke_wave(path, START, GOAL, UP).value for path in (finely(wanted), tip[::20])]

@@ -9,7 +9,16 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, EVENT, GOAL, JOINTS, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import (
+    EULER_ANGLES,
+    EVENT,
+    FELT_NORMAL,
+    GOAL,
+    JOINTS,
+    POSITION,
+    WRENCH,
+    suffixed,
+)
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -46,6 +55,8 @@ class Row:
         Outputs that were switched in this cycle.
     goal : array, shape (3,), or None
         To which the stroke is drawn, mm, where it may move.
+    normal : array, shape (3,), or None
+        Of the surface, as estimated.
     """
 
     t: float
@@ -65,6 +76,7 @@ class Row:
     force: float = 0.0
     contact: str = ""
     goal: Floats | None = None
+    normal: Floats | None = None
 
 
 CONTACT = "contact"
@@ -108,7 +120,9 @@ class RunLog:
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
-        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1, "fn": 1} if coupled else {})
+        groups |= ({"wrench": 6} if sensed else {}) | (
+            {"coupling": 1, "fn": 1, "normal": 3} if coupled else {}
+        )
         groups |= {"goal": 3} if moving else {}
         self._joints = joints if joints <= len(JOINTS) else 0
         groups |= {"joints": self._joints} if self._joints else {}
@@ -135,7 +149,7 @@ class RunLog:
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
-            felt += (row.coupling, row.force)
+            felt += (row.coupling, row.force, np.nan if row.normal is None else row.normal)
         if self._moving:
             felt += (np.nan if row.goal is None else row.goal,)
         if self._joints:
@@ -172,6 +186,8 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out["coupling"] = rows.numbers("coupling")
     if "fn" in rows.groups:
         out["fn"] = rows.numbers("fn")
+    if "normal" in rows.groups and np.isfinite(rows.numbers("normal")).any():
+        out |= dict(zip(FELT_NORMAL, rows.numbers("normal").T, strict=True))
     if "goal" in rows.groups:
         out |= dict(zip(GOAL, rows.numbers("goal").T, strict=True))
     if "joints" in rows.groups:

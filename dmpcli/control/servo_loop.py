@@ -328,6 +328,7 @@ class PlanLoop(ControlLoop):
                 joints=state.joints,
                 event=switched,
                 goal=None if self.goals is None else self.goals.goal,
+                normal=self.pressing.sense.estimate if self.pressing and draws else None,
             ),
         )
         if failure is not None:
@@ -386,4 +387,4 @@ class ServoLoop(PlanLoop):
             return pressing.retreat(index, t)
         if cycle.wrench is None:
             return pressing.hold(index)
-        return pressing.displace(index, cycle.wrench, t)
+        return pressing.displace(index, cycle.wrench, t, cycle.state.position)

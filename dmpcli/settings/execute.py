@@ -121,6 +121,12 @@ class ExecuteSettings(Settings):
         Le(100),
         Option("Share of a stroke in contact that counts as drawn.", "%"),
     ] = 95.0
+    normal_from_force: Annotated[
+        bool, Option("Hold the force along the surface's own normal, as friction and motion show.")
+    ] = False
+    # How far that may lean from the planned normal, rad, and how fast it may turn, rad/s.
+    normal_angle: Annotated[float, Ge(0.001), Le(0.7)] = 0.175
+    normal_rate: Positive = 0.175
     # None of them is by the rule of `admittance.force_law`, from what the landing has measured.
     coupling_mass: Positive | None = None
     coupling_damping: Positive | None = None

@@ -134,7 +134,14 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+    for option in (
+        "force_setpoint",
+        "stiffness",
+        "delay",
+        "on_contact_loss",
+        "min_contact",
+        "normal_from_force",
+    ):
         if option in said and not presses:
             raise InputError(
                 f"--{option.replace('_', '-')}: nothing presses without --coupling force"
@@ -341,7 +348,7 @@ def _loop(
         check = None if tool_file is None else settings.tool_check
         policy = None
         if coupling is not None:
-            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+            policy = execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
         touch = execution.touch(
             bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )

@@ -187,7 +187,7 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
             watched = f"dmpcli.{module}.watched"
             stack.enter_context(mock.patch(watched, lambda servo: servo))
         stack.enter_context(_signals(bench))
-        stack.enter_context(_goals(bench, goals))
+        stack.enter_context(_goals(bench, np.random.default_rng([seed, 0x61])))
         result = CliRunner().invoke(app, _words(command, stroke, output))
         rest = _at_rest(bench) if not isinstance(result.exception, EndlessError) else True
     finding = Finding(
