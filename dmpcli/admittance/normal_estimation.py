@@ -141,6 +141,26 @@ class NormalEstimator:
         self._P = self._P - gain[:, None] * spread
 
 
+def carried(normal: Floats, before: Floats, planned: Floats) -> Floats:
+    """Carry a normal with the planned one to another place: it leans from it as it did.
+
+    Parameters
+    ----------
+    normal : array, shape (3,)
+        Unit vector, less than a right angle from `before`.
+    before, planned : array, shape (3,)
+        The planned unit normals, less than a right angle apart.
+    """
+    upright = float(normal @ before)
+    lean = normal - upright * before
+    across = lean - (lean @ planned) * planned
+    size = math.sqrt(across @ across)
+    if size < 1e-12:
+        return planned
+    found: Floats = upright * planned + math.sqrt(lean @ lean) / size * across
+    return found
+
+
 def turned(now: Floats, wanted: Floats, planned: Floats, most: float, step: float) -> Floats:
     """Turn a normal towards another, within a bound about the planned one and a step at a time.
 
