@@ -36,6 +36,7 @@ from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
+GRAVITY = 9.80665  # m/s²
 AGAIN = 6.0
 """How far a surface is looked for where contact is lost, mm: deeper lies another part."""
 # A zero is taken over this time, s.
@@ -253,7 +254,9 @@ def _largest(stroke: PlannedStroke) -> float | None:
     return None if stroke.force is None else float(stroke.force.max())
 
 
-def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: float) -> ContactPolicy:
+def policy_of(
+    batch: StrokeSelection, settings: ExecuteSettings, lookahead: float, weight: float = 0.0
+) -> ContactPolicy:
     """Return what the coupling goes by in a run of these strokes.
 
     Parameters
@@ -262,6 +265,8 @@ def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: floa
     settings : ExecuteSettings
     lookahead : float
         Of the arm, s.
+    weight : float
+        Of what the sensor carries, N.
     """
     own = [largest for stroke in batch.strokes if (largest := _largest(stroke))]
     setpoint = settings.setpoint(max(own, default=None))
@@ -287,6 +292,7 @@ def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: floa
         settings.coupling_stiffness,
         settings.coupling_zero_limit,
         settings.min_contact / 100.0,
+        weight / GRAVITY,
     )
 
 

@@ -348,7 +348,7 @@ def _loop(
         check = None if tool_file is None else settings.tool_check
         policy = None
         if coupling is not None:
-            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+            policy = execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
         touch = execution.touch(
             bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )

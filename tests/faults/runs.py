@@ -4,7 +4,7 @@ import os
 import signal
 import tempfile
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -127,6 +127,34 @@ def folder() -> Path:
     return made
 
 
+def generator(seed: int) -> np.random.Generator:
+    """Return what everything of a seed is drawn from."""
+    return np.random.default_rng([seed, 0xFA])
+
+
+def draw(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
+    """Draw a seed's command, and none to three kinds of faults."""
+    command = str(rng.choice([*COMMANDS], p=[*COMMANDS.values()]))
+    # By numbers of its own, so that a seed draws what it always drew for the rest.
+    goals = np.random.default_rng([seed, 0x60])
+    command = MOVED if command == "execute" and goals.random() < 1 / 3 else command
+    count = int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1]))
+    return command, [str(kind) for kind in rng.choice(sorted(KINDS), count, replace=False)]
+
+
+def telling(seeds: Iterable[int]) -> list[int]:
+    """Return the seeds that put a kind of fault on a command for the first time."""
+    seen: set[tuple[str, str]] = set()
+    found = []
+    for seed in seeds:
+        command, kinds = draw(seed, generator(seed))
+        told = {(command, kind) for kind in kinds}
+        if not told <= seen:
+            seen |= told
+            found.append(seed)
+    return found
+
+
 def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = None) -> Finding:
     """Run one seed.
 
@@ -137,17 +165,9 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
         Faults to put on; by the seed otherwise, none to three.
     command : str, optional
     """
-    rng = np.random.default_rng([seed, 0xFA])
-    drawn = str(rng.choice([*COMMANDS], p=[*COMMANDS.values()]))
-    # By numbers of its own, so that a seed draws what it always drew for the rest.
-    goals = np.random.default_rng([seed, 0x60])
-    drawn = MOVED if drawn == "execute" and goals.random() < 1 / 3 else drawn
+    rng = generator(seed)
+    drawn, chosen = draw(seed, rng)
     command = command or drawn
-    names = sorted(KINDS)
-    chosen = [
-        str(k)
-        for k in rng.choice(names, int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1])), replace=False)
-    ]
     chosen = chosen if kinds is None else [*kinds]
     stroke = "long" if command == "execute file" else str(rng.choice(["stroke", "short"]))
     wrong = Wrong()
@@ -167,7 +187,7 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
             watched = f"dmpcli.{module}.watched"
             stack.enter_context(mock.patch(watched, lambda servo: servo))
         stack.enter_context(_signals(bench))
-        stack.enter_context(_goals(bench, goals))
+        stack.enter_context(_goals(bench, np.random.default_rng([seed, 0x61])))
         result = CliRunner().invoke(app, _words(command, stroke, output))
         rest = _at_rest(bench) if not isinstance(result.exception, EndlessError) else True
     finding = Finding(
