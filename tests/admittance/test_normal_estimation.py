@@ -72,6 +72,8 @@ def test_a_tool_that_stands_or_is_lifted_tells_nothing():
     assert not estimator.feel(np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]), UP)
     assert not estimator.feel(np.array([1.0, 0.0, -0.1]), np.array([20.0, 0.0, 0.0]), UP)
     np.testing.assert_allclose(estimator.normal, UP)
+    with pytest.raises(ValueError, match="nothing is known"):
+        NormalEstimator(PERIOD).normal  # noqa: B018
     assert estimator.heard == 0
 
 
