@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import (
     CLEARANCE,
@@ -24,6 +24,7 @@ from dmpcli.surfaces.kernels.tree import (
     closest,
     corner,
     flat_normal,
+    in_doubt,
     on_facet,
     outward_of,
     smooth_normal,
@@ -44,11 +45,11 @@ _ROOM = 1e-9
 @kernel
 def _beside(reals: Floats, row: int, k: int, p: Vector) -> float:
     """How far a point lies beyond the line of an edge, in the facet's plane."""
-    return dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k]
+    return float(dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k])
 
 
 @kernel
-def _steepness(reals: Floats, numbers: Integers, row: int, other: int) -> float:
+def _steepness(reals: Floats, numbers: Halves, row: int, other: int) -> float:
     """How steep a facet that shares a corner leaves the plane of another, by the way outwards.
 
     Over any point of it lies at most so much more height over the plane per distance from the
@@ -99,7 +100,7 @@ def _apart(reals: Floats, row: int, other: int) -> float:
 
 
 @kernel
-def _know(facets: Facets, row: int, nodes: Integers) -> None:
+def _know(facets: Facets, row: int, nodes: Halves) -> None:
     """Find clearance and slope of a facet, see `certified`."""
     reals, numbers = facets.reals, facets.numbers
     reach = 2.0 * _NEAR
@@ -144,7 +145,7 @@ def _know(facets: Facets, row: int, nodes: Integers) -> None:
 
 
 @kernel
-def certified(facets: Facets, row: int, height: float, inside: float, nodes: Integers) -> bool:
+def certified(facets: Facets, row: int, height: float, inside: float, nodes: Halves) -> bool:
     """Tell whether the foot of a point within a facet is the closest of the whole mesh.
 
     What shares no corner with the facet is at least its clearance away from it. What shares one
@@ -155,12 +156,12 @@ def certified(facets: Facets, row: int, height: float, inside: float, nodes: Int
     if facets.reals[row, CLEARANCE] < 0.0:
         _know(facets, row, nodes)
     near = 2.0 * height + _ROOM < facets.reals[row, CLEARANCE]
-    return near and inside > height * facets.reals[row, SLOPE] + _ROOM
+    return bool(near and inside > height * facets.reals[row, SLOPE] + _ROOM)
 
 
 @kernel
 def followed(
-    facets: Facets, p: Vector, row: int, nodes: Integers, offs: Floats
+    facets: Facets, p: Vector, row: int, nodes: Halves, offs: Floats
 ) -> tuple[Vector, int]:
     """Closest point of the mesh, and its row, from a facet nearby on."""
     reals = facets.reals
@@ -198,7 +199,10 @@ class Limits(NamedTuple):
 
 
 class Feet(NamedTuple):
-    """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met."""
+    """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met.
+
+    Where there is `doubt` numpy is to decide, on `point` and `way`, e_v unnormalised.
+    """
 
     foot: Floats
     across: Floats
@@ -208,6 +212,9 @@ class Feet(NamedTuple):
     beyond: Booleans
     far: Booleans
     back: Booleans
+    doubt: Booleans
+    point: Floats
+    way: Floats
 
 
 @kernel
@@ -271,6 +278,11 @@ def lift(
                 foot, row = closest(facets, p, nodes, offs)
             else:
                 foot, row = followed(facets, p, row, nodes, offs)
+            unsure = in_doubt(facets, p, foot, row)
+            out.doubt[b, k] = unsure
+            if unsure:
+                out.point[b, k, 0], out.point[b, k, 1], out.point[b, k, 2] = p
+                out.way[b, k, 0], out.way[b, k, 1], out.way[b, k, 2] = way
             n = times(sign[b, 0], smooth_normal(facets.reals, foot, row))
             a, c = i + (1 if r > 0.5 else 0), j + (1 if s > 0.5 else 0)
             beyond = facets.numbers[row, PART] != part[b]
