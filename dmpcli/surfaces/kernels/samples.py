@@ -230,27 +230,28 @@ def _slopes(s: float) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _patch(values: Floats, i: int, j: int, r: float, s: float) -> tuple[Vector, Vector]:
-    """Position and unnormalised e_v in a cell of nodes (nu, nv, 12)."""
-    a, b, c, d = _weights(r)
+def _along_u(values: Floats, at: tuple[int, int, int], k: int, r: float) -> tuple[float, float]:
+    """Coordinate k on a line of a cell between two nodes, and its v-slope."""
+    b, i, j = at
+    p, pu, q, qu = _weights(r)
+    value = p * values[b, i, j, k] + q * values[b, i + 1, j, k]
+    value += pu * values[b, i, j, 6 + k] + qu * values[b, i + 1, j, 6 + k]
+    slope = p * values[b, i, j, 3 + k] + q * values[b, i + 1, j, 3 + k]
+    slope += pu * values[b, i, j, 9 + k] + qu * values[b, i + 1, j, 9 + k]
+    return value, slope
+
+
+@kernel
+def _coordinate(
+    values: Floats, at: tuple[int, int, int], k: int, r: float, s: float
+) -> tuple[float, float]:
+    """Coordinate k of a point in a cell, and of the unnormalised e_v there."""
+    near, near_v = _along_u(values, at, k, r)
+    far, far_v = _along_u(values, (at[0], at[1], at[2] + 1), k, r)
     w0, w1, w2, w3 = _weights(s)
     t0, t1, t2, t3 = _slopes(s)
-    p0, p1, q0, q1 = values[i, j], values[i, j + 1], values[i + 1, j], values[i + 1, j + 1]
-    x, y, z, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        near = (a * p0[k] + c * q0[k]) + (b * p0[6 + k] + d * q0[6 + k])
-        near_v = (a * p0[3 + k] + c * q0[3 + k]) + (b * p0[9 + k] + d * q0[9 + k])
-        far = (a * p1[k] + c * q1[k]) + (b * p1[6 + k] + d * q1[6 + k])
-        far_v = (a * p1[3 + k] + c * q1[3 + k]) + (b * p1[9 + k] + d * q1[9 + k])
-        value = w0 * near + w1 * near_v + w2 * far + w3 * far_v
-        slope = t0 * near + t1 * near_v + t2 * far + t3 * far_v
-        if k == 0:
-            x, dx = value, slope
-        elif k == 1:
-            y, dy = value, slope
-        else:
-            z, dz = value, slope
-    return (x, y, z), (dx, dy, dz)
+    value = w0 * near + w1 * near_v + w2 * far + w3 * far_v
+    return value, t0 * near + t1 * near_v + t2 * far + t3 * far_v
 
 
 @kernel
@@ -273,7 +274,10 @@ def lift(
             i = min(max(math.floor(u[b, k]), 0), nu - 1)
             j = min(max(math.floor(v[b, k]), 0), nv - 1)
             r, s = u[b, k] - i, v[b, k] - j
-            p, way = _patch(strip.values[b], i, j, r, s)
+            x, dx = _coordinate(strip.values, (b, i, j), 0, r, s)
+            y, dy = _coordinate(strip.values, (b, i, j), 1, r, s)
+            z, dz = _coordinate(strip.values, (b, i, j), 2, r, s)
+            p, way = (x, y, z), (dx, dy, dz)
             if row < 0:
                 foot, row = closest(facets, p, nodes, offs)
             else:
@@ -287,8 +291,8 @@ def lift(
             a, c = i + (1 if r > 0.5 else 0), j + (1 if s > 0.5 else 0)
             beyond = facets.numbers[row, PART] != part[b]
             beyond = beyond or beyond_border(facets, p, foot, row, limits.on_border)
-            near = strip.normal[b, a, c]
-            out.back[b, k] = not beyond and dot(n, (near[0], near[1], near[2])) < 0.0
+            near = strip.normal[b, a, c, 0], strip.normal[b, a, c, 1], strip.normal[b, a, c, 2]
+            out.back[b, k] = not beyond and dot(n, near) < 0.0
             allowed = max(facets.reals[row, REACH], limits.landing * strip.away[b, i, j])
             out.far[b, k] = not beyond and length(sub(p, foot)) > allowed
             out.beyond[b, k] = beyond
