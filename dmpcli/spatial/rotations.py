@@ -65,6 +65,29 @@ def to_euler(R: Floats) -> Floats:
     return np.stack(_angles(np.moveaxis(R, (-2, -1), (0, 1))), axis=-1)
 
 
+def to_euler_one(R: Floats) -> tuple[float, float, float]:
+    """`to_euler` of one rotation matrix, in plain floats: several times faster, for loops.
+
+    Parameters
+    ----------
+    R : array, shape (3, 3)
+
+    Returns
+    -------
+    tuple of float
+        rx, ry, rz in rad.
+    """
+    (r00, r01, r02), (_, r11, r12), (_, r21, r22) = R.tolist()
+    cy = math.sqrt(r00 * r00 + r01 * r01)
+    if cy <= 1e-9:
+        rx, rz = math.atan2(r21, r11), 0.0
+    else:
+        rx, rz = math.atan2(-r12, r22), math.atan2(-r01, r00)
+    low = -math.pi + 1e-9
+    rx, rz = (angle + 2.0 * math.pi if angle < low else angle for angle in (rx, rz))
+    return rx, math.atan2(r02, cy), rz
+
+
 def _angles(R: Floats) -> tuple[Floats, Floats, Floats]:
     """Euler angles of rotations whose own axes are the first ones, shape (3, 3, ...)."""
     cy = np.sqrt(R[0, 0] * R[0, 0] + R[0, 1] * R[0, 1])
