@@ -4,13 +4,14 @@ Nothing here grows with the batch but a few numbers per stroke; what every strok
 goes into CSV files as it is measured.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TextIO
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.messages import Advance
 from dmpcli.metrics import paper_values
 from dmpcli.records.dataset import BatchFolder, states_of
 from dmpcli.reporting.batch_measures import (
@@ -139,7 +140,7 @@ def measure(
     label: str,
     sight: MeasurementContext,
     tables: Tables | None,
-    advance: Callable[[int], None],
+    advance: Advance,
 ) -> MeasuredBatch:
     """Measure all strokes of a batch.
 
@@ -152,7 +153,7 @@ def measure(
         What to measure against.
     tables : Tables, optional
         Files for the numbers of every stroke.
-    advance : callable
+    advance : Advance
         Told how many strokes are done.
 
     Raises
