@@ -1,10 +1,12 @@
 """The front door: one line per subcommand; nothing heavy is loaded until a command runs."""
 
+import functools
 import importlib
 import keyword
 import os
 import signal
 import sys
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -53,18 +55,27 @@ class LazyCommand(TyperCommand):
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> Any:
         """Parse the words after the subcommand's name, by what its module declares."""
-        module = importlib.import_module(module_of(str(self.name)))
-        whole = typer.Typer(
-            add_completion=False,
-            rich_markup_mode=None,
-            pretty_exceptions_enable=False,
-            context_settings=CONTEXT,
-        )
         name = str(self.name)
-        whole.command(name, cls=HelpedCommand)(shared(module.command, name, [*args]))
-        return typer.main.get_command(whole).make_context(
-            info_name, args, parent, **{"max_content_width": width()} | extra
-        )
+        made, words = _made(importlib.import_module(module_of(name)).command, name)
+        words[:] = args
+        return made.make_context(info_name, args, parent, **{"max_content_width": width()} | extra)
+
+
+@functools.cache
+def _made(command: Callable[..., None], name: str) -> tuple[Any, list[str]]:
+    """Return a subcommand with all its options, and where the words that it is called with go.
+
+    To make it takes longer than many a call, and a process may call it often.
+    """
+    whole = typer.Typer(
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings=CONTEXT,
+    )
+    words: list[str] = []
+    whole.command(name, cls=HelpedCommand)(shared(command, name, words))
+    return typer.main.get_command(whole), words
 
 
 def _show_defect(error: DmpError) -> None:

@@ -134,11 +134,24 @@ LINE = ["--reference", "line", "--duration", "1.5", "--start", "-551", "131", "-
 LINE += ["--goal", "-561", "131", "-17.56"]
 
 
-@pytest.mark.parametrize("words", [["record", "-o", "-", *LINE], ["inspect", "none.csv"]])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(["record", "-o", "-", *LINE], marks=pytest.mark.slow),
+        ["inspect", "none.csv"],
+    ],
+    ids=["record", "inspect"],
+)
+def told(request, tmp_path_factory):
+    """A command, and how it ends for somebody who reads all that it says."""
+    command = [sys.executable, "-m", "dmpcli", *request.param]
+    folder = tmp_path_factory.mktemp("told")
+    return command, subprocess.run(command, cwd=folder, capture_output=True, check=False)
+
+
 @pytest.mark.parametrize("how", ["closed", "broken"])
-def test_whoever_closes_standard_error_changes_no_output_and_no_exit_code(how, words, tmp_path):
-    command = [sys.executable, "-m", "dmpcli", *words]
-    sound = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
+def test_whoever_closes_standard_error_changes_no_output_and_no_exit_code(how, told, tmp_path):
+    command, sound = told
     assert sound.stderr
     if how == "closed":
         done = subprocess.run(

@@ -5,7 +5,10 @@ stiffness k, felt a delay L later, it is a proportional-integral control of an i
 
 - the smallest damping that is stable is about ``(2/π)·k·L`` for a pure delay, a little more with
   the integral; the rule takes ``D = 0.9·k·L`` and ``T_i = 4·L``;
-- the integral takes away the error ``D·v`` that a surface leaves which departs from the plan at v.
+- the integral takes away the error ``D·v`` that a surface leaves which departs from the plan at v;
+- a sensor feels the inertia of the tool that it carries, m·ë, too. At a frequency above √(k/m) that
+  is more than the contact, and of the other sign: a soft contact of a heavy tool swings unless
+  ``D`` is some 0.6·m/T, at the servos' usual lags. The rule takes ``D = 0.75·m/T`` at the least.
 
 Plain scalars: this runs once a cycle.
 """
@@ -15,6 +18,9 @@ from dataclasses import dataclass, replace
 
 DAMPING_SHARE, INTEGRAL_DELAYS = 0.9, 4.0
 """Of the rule: damping by stiffness times delay, and the integral's time by the delay."""
+
+INERTIA_SHARE, LEAST_INERTIA_SHARE = 0.75, 0.6
+"""Damping by the tool's mass over the period: of the rule, and where a loop begins to swing."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,9 @@ class LawState:
     saturated: bool = False
 
 
-def by_rule(stiffness: float, delay: float, period: float, spring: float = 0.0) -> ForceGains:
+def by_rule(
+    stiffness: float, delay: float, period: float, spring: float = 0.0, tool: float = 0.0
+) -> ForceGains:
     """Return the gains for a contact of this stiffness, felt so much later.
 
     The mass is period times damping: then the discrete model reaches its speed within one step,
@@ -87,9 +95,12 @@ def by_rule(stiffness: float, delay: float, period: float, spring: float = 0.0) 
         s.
     spring : float
         K, N/mm.
+    tool : float
+        Mass on the sensor's tool side, N·s²/mm, or thousand kg.
     """
     damping = DAMPING_SHARE * stiffness * delay
-    return ForceGains(period * damping, damping, spring, INTEGRAL_DELAYS * delay, period)
+    made = ForceGains(period * damping, damping, spring, INTEGRAL_DELAYS * delay, period)
+    return made.softened(max(INERTIA_SHARE * tool / (period * damping), 1.0))
 
 
 def advance(gains: ForceGains, state: LawState, error: float, fastest: float) -> LawState:

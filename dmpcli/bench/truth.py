@@ -2,6 +2,7 @@
 
 import io
 from array import array
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,9 +28,11 @@ class Truth:
     def __init__(self) -> None:
         self._rows = array("d")
 
-    def add(self, t: float, setpoint: int, tip: Floats, force: Floats, push: float) -> None:
-        """Add a row; `tip` and `force` have shape (3,)."""
-        self._rows.extend((t, setpoint, *tip.tolist(), *force.tolist(), push))
+    def add(
+        self, t: float, setpoint: int, tip: Sequence[float], force: Sequence[float], push: float
+    ) -> None:
+        """Add a row; `tip` and `force` are of three."""
+        self._rows.extend((t, setpoint, *tip, *force, push))
 
     def columns(self) -> dict[str, Floats]:
         """Return the rows so far by column, each of shape (n,)."""

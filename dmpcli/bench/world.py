@@ -5,7 +5,8 @@ happens: what is asked of a time between two steps is that of the last one.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -36,6 +37,10 @@ _READY = {
 }
 # Readings whose noise is drawn at once.
 _DRAWN = 256
+
+Vector: TypeAlias = tuple[float, float, float]
+"""What a step works with: arrays of three cost ten times as much."""
+_NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class World:
@@ -101,14 +106,24 @@ class World:
         zero = parameters.tool.zero
         self._bias = parameters.sensor.bias + (0.0 if zero is None else zero)
         self._planned, self._torque = np.zeros(self._model.nv), np.zeros(self._model.nv)
-        self._force, self._velocity = np.zeros(6), np.zeros(6)
-        self._pushing, self._rubbing = np.zeros(3), np.zeros(3)
+        self._velocity = np.zeros(6)
+        self._pushing = self._rubbing = _NONE
         self._touching = self._rubs = False
+        self._look_at(self._data)
         workpiece = parameters.workpiece
         self._traced = workpiece if isinstance(workpiece, Traced) else None
         if self._traced is not None:
             self._trace(self._traced)
             self._mujoco.mj_forward(self._model, self._data)
+
+    def _look_at(self, data: Any) -> None:
+        """Keep MuJoCo's arrays themselves at hand: in each step they would be wrapped anew."""
+        self._angles, self._rates = data.qpos[:6], data.qvel[:6]
+        self._biases, self._applied = data.qfrc_bias[:6], data.qfrc_applied[:6]
+        self._slid = data.qpos[6:7]
+        self._site, self._axes = data.site_xpos[self._tcp], data.site_xmat[self._tcp]
+        self._centre, self._extra = data.geom_xpos[self._tip], data.xfrc_applied[self._pen]
+        self._pull, self._drag = np.empty(6), np.empty(6)
 
     def _ready(self) -> Floats:
         """The usual posture, turned to where the arm shall stand."""
@@ -145,9 +160,7 @@ class World:
     @property
     def tip(self) -> Floats:
         """Where the end of the pen truly is, shape (3,), mm."""
-        pose = self.pose
-        end: Floats = pose.position - self.compression * pose.rotation[:, 2]
-        return end
+        return np.array(self._end())
 
     @property
     def compression(self) -> float:
@@ -157,7 +170,7 @@ class World:
     @property
     def contact_force(self) -> Floats:
         """What the workpiece truly does to the pen, shape (3,), N, base axes."""
-        return self._pushing + self._rubbing
+        return np.array(_sum(self._pushing, self._rubbing))
 
     @property
     def touching(self) -> bool:
@@ -267,12 +280,14 @@ class World:
         # What moves the arm as planned and holds its weight is fed forward; a load bends it.
         self._planned[:6] = acceleration
         mujoco.mj_mulM(model, data, self._torque, self._planned)
-        data.qfrc_applied[:6] = (
-            self._torque[:6]
-            + data.qfrc_bias[:6]
-            + self._stiffness * (position - data.qpos[:6])
-            + self._damping * (velocity - data.qvel[:6])
-        )
+        pull, drag = self._pull, self._drag
+        np.subtract(position, self._angles, out=pull)
+        pull *= self._stiffness
+        np.subtract(velocity, self._rates, out=drag)
+        drag *= self._damping
+        pull += drag
+        pull += self._torque[:6]
+        np.add(pull, self._biases, out=self._applied)
         mujoco.mj_step2(model, data)
         # Before the next contacts are found, to which these forces would not belong.
         self._feel_contacts()
@@ -282,49 +297,68 @@ class World:
         mujoco.mj_step1(model, data)
         self._steps += 1
         if self.truth is not None:
-            push = float(np.linalg.norm(self._pushing))
-            self.truth.add(self.t, self._setpoints, self.tip, self.contact_force, push)
+            push = math.hypot(*self._pushing)
+            force = _sum(self._pushing, self._rubbing)
+            self.truth.add(self.t, self._setpoints, self._end(), force, push)
+
+    def _end(self) -> Vector:
+        """Where the end of the pen truly is, mm."""
+        slid = 1e3 * self._slid.item()
+        axes, site = self._axes.tolist(), self._site.tolist()
+        return (
+            1e3 * site[0] - slid * axes[2],
+            1e3 * site[1] - slid * axes[5],
+            1e3 * site[2] - slid * axes[8],
+        )
 
     def _feel_contacts(self) -> None:
         """Add up what the contacts push with, and rub with it during the next step."""
         data = self._data
-        self._touching = data.ncon > 0
-        if not self._touching:
+        count = data.ncon
+        self._touching = count > 0
+        if not count:
             if self._rubs:
-                self._pushing, self._rubbing, self._rubs = np.zeros(3), np.zeros(3), False
-                data.xfrc_applied[self._pen] = 0.0
+                self._pushing, self._rubbing, self._rubs = _NONE, _NONE, False
+                self._extra[:] = 0.0
             return
         mujoco, model = self._mujoco, self._model
         mujoco.mj_objectVelocity(
             model, data, mujoco.mjtObj.mjOBJ_GEOM, self._tip, self._velocity, 0
         )
-        spin, speed = self._velocity[:3].tolist(), self._velocity[3:].tolist()
-        centre = data.geom_xpos[self._tip].tolist()
-        pushing, rubbing, torque = np.zeros(3), np.zeros(3), np.zeros(3)
-        for i in range(data.ncon):
+        motion = self._velocity.tolist()
+        spin, speed = motion[:3], motion[3:]
+        centre = self._centre.tolist()
+        pushing = rubbing = torque = _NONE
+        # Of a contact without MuJoCo's friction the one force is the push.
+        forces = data.efc_force
+        for i in range(count):
             contact = data.contact[i]
-            mujoco.mj_contactForce(model, data, i, self._force)
+            at = contact.efc_address
+            if at < 0:
+                continue
             # The frame's first row is the normal, from the first geom to the second.
+            push = forces[at].item()
             side = 1.0 if contact.geom2 == self._tip else -1.0
-            normal = [side * value for value in contact.frame[:3].tolist()]
-            lever = [a - b for a, b in zip(contact.pos.tolist(), centre, strict=True)]
-            push = float(self._force[0])
+            x, y, z = contact.frame[:3].tolist()
+            normal = (side * x, side * y, side * z)
+            px, py, pz = contact.pos.tolist()
+            lever = (px - centre[0], py - centre[1], pz - centre[2])
             rub = self._rub(push, normal, _sum(speed, _cross(spin, lever)))
-            pushing += [push * value for value in normal]
-            rubbing += rub
-            torque += _cross(lever, rub)
+            pushing = _sum(pushing, (push * normal[0], push * normal[1], push * normal[2]))
+            rubbing = _sum(rubbing, rub)
+            torque = _sum(torque, _cross(lever, rub))
         self._pushing, self._rubbing, self._rubs = pushing, rubbing, True
         # MuJoCo takes it at the body's centre of mass, the middle of the tip.
-        data.xfrc_applied[self._pen, :3], data.xfrc_applied[self._pen, 3:] = rubbing, torque
+        self._extra[:] = (*rubbing, *torque)
 
-    def _rub(self, push: float, normal: list[float], speed: list[float]) -> list[float]:
+    def _rub(self, push: float, normal: Vector, speed: Vector) -> Vector:
         """Coulomb's friction of one contact, N; speed in m/s."""
-        away = sum(a * b for a, b in zip(speed, normal, strict=True))
-        along = [a - away * b for a, b in zip(speed, normal, strict=True)]
+        away = speed[0] * normal[0] + speed[1] * normal[1] + speed[2] * normal[2]
+        x, y, z = (a - away * b for a, b in zip(speed, normal, strict=True))
         friction = self.parameters.pen.friction * push
         full = max(_SLIDING, friction * self._step / _SLIDING_MASS)
-        share = -friction / max(math.hypot(*along), full)
-        return [share * value for value in along]
+        share = -friction / max(math.hypot(x, y, z), full)
+        return (share * x, share * y, share * z)
 
     def _trace(self, workpiece: Traced) -> None:
         """Lay the plane that stands for the surface under the tip."""
@@ -342,9 +376,9 @@ class World:
             yield from self.parameters.sensor.noise * rng.standard_normal((_DRAWN, 6))
 
 
-def _cross(a: list[float], b: list[float]) -> list[float]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+def _cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def _sum(a: list[float], b: list[float]) -> list[float]:
-    return [x + y for x, y in zip(a, b, strict=True)]
+def _sum(a: Sequence[float], b: Sequence[float]) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

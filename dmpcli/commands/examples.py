@@ -12,6 +12,7 @@ SENSOR, ROBOT = "netft://192.168.1.10", "elite://192.168.1.20"
 GIVEN = (
     "part.stl",
     "pairs.csv",
+    "goals.csv",
     "geometry.json",
     "log.csv",
     "drawing.svg",
@@ -19,8 +20,9 @@ GIVEN = (
     "touched.csv",
     "cut.parquet.journal",
 )
-"""Files that a user has before the first example: meshes, pairs, a tool without weight, a recording
-of another program, a drawing, points touched on a mesh, and what a crash has left."""
+"""Files that a user has before the first example: meshes, pairs, goals over time, a tool without
+weight, a recording of another program, a drawing, points touched on a mesh, and what a crash has
+left."""
 
 
 class Example(NamedTuple):
@@ -86,6 +88,10 @@ EXAMPLES: dict[str, tuple[Example, ...]] = {
         Example(
             "All strokes of a batch in one run, pressing with 5 N.",
             "dmpcli execute batch -o pressed.parquet --coupling force --force-setpoint 5",
+        ),
+        Example(
+            "While its goal moves, by a table of t in s and x, y, z in mm.",
+            "dmpcli execute trajectory.parquet -o moved.parquet --goal-from goals.csv",
         ),
         Example(
             "On a real arm, at half the speed, led to the start at 20 mm/s.",

@@ -53,6 +53,14 @@ def command(
             autocompletion=choice("force"),
         ),
     ] = None,
+    goal_from: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SOURCE",
+            help="Let the goal move while it is drawn, on a plane: a file of t x y z, or "
+            "udp://HOST:PORT.",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only check; print the verdict, send nothing.")
     ] = False,
@@ -104,6 +112,7 @@ def command(
         dry_run,
         allow_file_mode,
         ignore_events,
+        goal_from,
     )
     run = execute(settings, request).run
     if run is not None and run.signal is not None:

@@ -26,10 +26,14 @@ class HelpedCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words; who asks for the settings alone need not name files."""
         before = args[: args.index("--")] if "--" in args else args
-        if "--print-config" in before:
-            for option in self.params:
-                option.required = False
-        return super().parse_args(ctx, args)
+        needed = [option for option in self.params if option.required]
+        for option in needed:
+            option.required = "--print-config" not in before
+        try:
+            return super().parse_args(ctx, args)
+        finally:
+            for option in needed:
+                option.required = True
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         """Write the examples, each line as it is typed."""

@@ -62,6 +62,9 @@ def command(
         bool,
         typer.Option("--paper", help="The paper's tables beside ours, and with -o its figures."),
     ] = False,
+    jobs: Annotated[
+        int, typer.Option(min=1, max=1024, help="Processes that measure large batches.")
+    ] = 1,
     form: RecordingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
@@ -86,6 +89,10 @@ def command(
         from dmpcli.reporting.turnable import check
 
         check()
+    if jobs > 1:
+        from dmpcli.batch import process_pool
+
+        process_pool.begin()
     layout = form.as_layout()
     read = grounds = None
     if pairs is not None:
@@ -97,7 +104,7 @@ def command(
         grounds = SiteGrounds(pairs, otherwise, surface_cache)
     elif surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output, grounds, paper, view, png)
+    made = report(files, None, layout, read, output, grounds, paper, view, png, jobs)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
     if show and output is not None:
         typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))

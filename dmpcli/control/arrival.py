@@ -70,6 +70,10 @@ class ArrivalMonitor:
         """Whether the stroke is drawn, as far as the arm's own pose tells."""
         return self.started and self.near
 
+    def follow(self, plan: Plan) -> None:
+        """Go on with a plan whose end has moved; what was seen of the arm counts on."""
+        self._plan = plan
+
     def see(self, state: RobotState, index: float) -> None:
         """Look at the arm while a set-point is sent.
 

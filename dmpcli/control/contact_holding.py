@@ -32,7 +32,8 @@ class HeldForce(ContactCourse):
         if policy.gains is None:
             k = policy.stiffness or self.stiffness or _USUAL
             whole = self._known_delay + self._period / 2.0
-            self.gains = by_rule(k, whole, self._period, policy.spring)
+            tool = 1e-3 * policy.tool_mass
+            self.gains = by_rule(k, whole, self._period, policy.spring, tool)
         self._swings = None
 
     def _draw(self, t: float, force: float, wanted: float) -> None:

@@ -61,6 +61,8 @@ class ContactPolicy:
         What the lifted tool may read beside its zero, N.
     least_share : float
         Share of the stroke in contact, below which it does not count as drawn, 0 to 1.
+    tool_mass : float
+        Of what the sensor carries, kg: it feels its inertia.
     """
 
     setpoint: float
@@ -83,6 +85,7 @@ class ContactPolicy:
     spring: float = 0.0
     zero_limit: float = 2.0
     least_share: float = 0.95
+    tool_mass: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from dmpcli.admittance.force_law import LEAST_INERTIA_SHARE
 from dmpcli.admittance.force_stability import is_stable
 from dmpcli.control.contact_course import REST
 from dmpcli.control.contact_holding import NEAR, NEAR_TIME, HeldForce
@@ -105,8 +106,19 @@ class SoughtSurface(HeldForce):
 
     def _refused(self, t: float) -> bool:
         """Refuse gains that the contact just measured would make swing."""
-        k, delay = self.stiffness, self._known_delay
-        if self.gains is None or k is None or is_stable(self.gains, k, delay):
+        k, delay, tool = self.stiffness, self._known_delay, self.policy.tool_mass
+        if self.gains is None or k is None:
+            return False
+        if self.gains.damping < LEAST_INERTIA_SHARE * 1e-3 * tool / self._period:
+            self.fail(
+                t,
+                "oscillating",
+                f"damping {self.gains.damping:.3g} N·s/mm is unstable on a tool of {tool:.3g} kg, "
+                f"whose inertia is felt too, on {k:.3g} N/mm behind {delay:.3g} s: leave the gains "
+                "to the rule, or use a lighter tool",
+            )
+            return True
+        if is_stable(self.gains, k, delay):
             return False
         self.fail(
             t,

@@ -15,6 +15,7 @@ from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import LONG, ForceInput, ForceTracker
+from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
 from dmpcli.control.servo_loop import DONE, PlanLoop
 from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.errors import InputError
@@ -35,6 +36,7 @@ from dmpcli.spatial.rotations import from_euler
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
+GRAVITY = 9.80665  # m/s²
 AGAIN = 6.0
 """How far a surface is looked for where contact is lost, mm: deeper lies another part."""
 # A zero is taken over this time, s.
@@ -216,7 +218,11 @@ def touch(
     pressing = None
     if coupling is not None and policy is not None:
         supervisor = ContactSupervisor(policy, plan.period, told)
-        pressing = ForceTracker(supervisor, coupling, plan, settings.force_setpoint)
+        normals = NormalPolicy(
+            settings.normal_from_force, settings.normal_angle, settings.normal_rate
+        )
+        sense = NormalSense(plan.period, normals)
+        pressing = ForceTracker(supervisor, coupling, plan, settings.force_setpoint, sense=sense)
     return ForceInput(sensing, Compensation(zeroed), pressing)
 
 
@@ -248,7 +254,9 @@ def _largest(stroke: PlannedStroke) -> float | None:
     return None if stroke.force is None else float(stroke.force.max())
 
 
-def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: float) -> ContactPolicy:
+def policy_of(
+    batch: StrokeSelection, settings: ExecuteSettings, lookahead: float, weight: float = 0.0
+) -> ContactPolicy:
     """Return what the coupling goes by in a run of these strokes.
 
     Parameters
@@ -257,6 +265,8 @@ def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: floa
     settings : ExecuteSettings
     lookahead : float
         Of the arm, s.
+    weight : float
+        Of what the sensor carries, N.
     """
     own = [largest for stroke in batch.strokes if (largest := _largest(stroke))]
     setpoint = settings.setpoint(max(own, default=None))
@@ -282,6 +292,7 @@ def policy_of(batch: StrokeSelection, settings: ExecuteSettings, lookahead: floa
         settings.coupling_stiffness,
         settings.coupling_zero_limit,
         settings.min_contact / 100.0,
+        weight / GRAVITY,
     )
 
 
@@ -332,6 +343,12 @@ def pressed(pressing: ForceTracker) -> str:
         said += (
             f"; landed with {found['landing_peak']:.2f} N at the most, on {found['stiffness']:.3g} "
             f"N/mm behind {found['delay']:.2g} s"
+        )
+    if "normal_angle" in found:
+        mean, most = (np.degrees(found["normal_angle"][key]) for key in ("mean", "p95"))
+        said += (
+            f"; the surface leans from the planned normal by {mean:.1f}° in the mean, {most:.1f}° "
+            f"(95 %), friction {found['friction']:.2f}"
         )
     if pressing.supervisor.wall is not None:
         said += f"; ended by a wall: {pressing.supervisor.wall}"
@@ -387,6 +404,8 @@ def record_of(
         facts |= loop.pressing.facts()
         if "coupling" in facts:
             facts["coupling"] = facts["coupling"] | loop.pressing.gains()
+    if loop.goals is not None:
+        facts |= loop.goals.facts()
     if "strokes" in facts:
         facts |= progress_of([stroke["id"] for stroke in facts["strokes"]], loop.drawn)
     columns = loop.log.columns()

@@ -15,6 +15,7 @@ from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.contact_tally import ContactTally
 from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.plan import Plan
 
@@ -40,12 +41,16 @@ class ForceTracker:
         F_d of all of the stroke that is drawn in contact, N; None takes the plan's own.
     tally : ContactTally, optional
         Of the strokes before.
+    sense : NormalSense, optional
+        What follows the surface's normal.
 
     Attributes
     ----------
     supervisor : ContactSupervisor
     tally : ContactTally
         What was felt on the strokes, with `on` of all of them.
+    sense : NormalSense
+        The same of the surface's normal.
     """
 
     def __init__(
@@ -55,6 +60,7 @@ class ForceTracker:
         plan: Plan,
         override: float | None = None,
         tally: ContactTally | None = None,
+        sense: NormalSense | None = None,
     ) -> None:
         if plan.normal is None:
             raise ValueError("a plan without normals has nothing to press along")
@@ -62,6 +68,8 @@ class ForceTracker:
         self._override = override
         self.tally = ContactTally() if tally is None else tally
         self.tally.begin(plan.id)
+        self.sense = NormalSense(plan.period, NormalPolicy()) if sense is None else sense
+        self.sense.begin()
         self._delta = np.zeros(2)
         self._zero, self._zeros = np.zeros(3), 0
         self._wanted = _setpoints(plan, supervisor.policy.setpoint, override)
@@ -73,7 +81,13 @@ class ForceTracker:
 
     def on(self, plan: Plan) -> "ForceTracker":
         """Return the same supervisor and filter on another plan; nothing was felt there yet."""
-        return ForceTracker(self.supervisor, self._filter, plan, self._override, self.tally)
+        tally, sense = self.tally, self.sense
+        return ForceTracker(self.supervisor, self._filter, plan, self._override, tally, sense)
+
+    def follow(self, plan: Plan) -> None:
+        """Go on with a plan that is the same up to here, and whose end has moved in its plane."""
+        self._plan = plan
+        self._wanted = _setpoints(plan, self.supervisor.policy.setpoint, self._override)
 
     @property
     def e(self) -> float:
@@ -95,7 +109,9 @@ class ForceTracker:
         number = int(index + 1e-9)
         return float(self._wanted[min(number, len(self._wanted) - 1)])
 
-    def displace(self, index: float, wrench: Floats, t: float = 0.0) -> Floats:
+    def displace(
+        self, index: float, wrench: Floats, t: float = 0.0, position: Floats | None = None
+    ) -> Floats:
         """Return what to add to the set-point, shape (3,), mm.
 
         Parameters
@@ -106,6 +122,8 @@ class ForceTracker:
             On the tool, base axes, N and N·m.
         t : float
             s since the first set-point.
+        position : array, shape (3,), optional
+            Of the tool, mm; without it nothing is learned of the surface's normal.
         """
         supervisor, plan = self.supervisor, self._plan
         normal, R = plan.normal_at(index), plan.rotation[min(round(index), len(plan) - 1)]
@@ -117,9 +135,16 @@ class ForceTracker:
             self._zeros = 0
             supervisor.zero_is(t, float(np.linalg.norm(self._zero)))
         felt = wrench[:3] if self._zeros else wrench[:3] - R @ self._zero
+        wanted = self.wanted(index)
+        if position is not None and index > plan.lead and supervisor.state == "drawing":
+            self.sense.feel(t, felt, position, normal)
+        else:
+            self.sense.lift()
+        # The force is held along the surface's own normal, where that is asked for; the tool is
+        # displaced along the planned one, so that it draws the plan carried along its normals.
+        normal = self.sense.normal(normal)
         force = float(normal @ felt)
         off = felt - force * normal
-        wanted = self.wanted(index)
         supervisor.step(t, force, float(np.sqrt(off @ off)), wanted, self._speed(index))
         if index > plan.lead and wanted > 0.0:
             touching = force > min(supervisor.policy.contact, wanted / 2.0)
@@ -230,7 +255,7 @@ class ForceTracker:
         found = self.tally.facts(supervisor.policy.contact)
         if not found:
             return {"contact_events": events}
-        found |= {"landing_peak": supervisor.landing_peak}
+        found |= {"landing_peak": supervisor.landing_peak} | self.sense.facts()
         if supervisor.wall is not None:
             found["wall"] = asdict(supervisor.wall) | {"unavoidable": supervisor.wall.unavoidable}
         for name in ("stiffness", "delay"):

@@ -90,6 +90,11 @@ class OutputSwitch:
                 early = (index - at) / max(index - before, 1.0) * self._period
                 self._due.append((when - early + self._lookahead, event))
 
+    def follow(self, plan: Plan) -> None:
+        """Go on with a plan that is the same up to here, and whose end has moved."""
+        if self._last is not None:
+            self._last = plan, self._last[1]
+
     def act(self, now: float) -> tuple[str, DmpError | None]:
         """Switch what is due.
 

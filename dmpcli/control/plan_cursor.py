@@ -32,7 +32,7 @@ class PlanCursor:
         self._end = float(len(plan) - 1)
         self._brake: tuple[float, float] | None = None  # index where it began, duration
         self._elapsed = 0.0
-        self._speed, self._acceleration, _ = plan.sizes
+        plan.sizes  # noqa: B018  # kept: they are asked for when it has to come to rest
 
     @property
     def braking(self) -> bool:
@@ -57,6 +57,10 @@ class PlanCursor:
         if self._brake is not None or (self.index >= self._end and self._elapsed > 0):
             return "stop"
         return "approach" if self.waiting else self.plan.phase_at(self.index)
+
+    def follow(self, plan: Plan) -> None:
+        """Go on along a plan that is the same up to here, whose end has moved."""
+        self.plan, self._end = plan, float(len(plan) - 1)
 
     def release(self) -> None:
         """Go on from the stroke's start."""
@@ -88,8 +92,9 @@ class PlanCursor:
 
     def _ramp(self, last: int) -> float:
         ahead = slice(max(int(self.index) - 1, 0), last + 1)
-        speed = np.max(self._speed[ahead], axis=0)
-        acceleration = np.max(self._acceleration[ahead], axis=0)
+        speeds, accelerations, _ = self.plan.sizes
+        speed = np.max(speeds[ahead], axis=0)
+        acceleration = np.max(accelerations[ahead], axis=0)
         limits = self._limits
         return max(
             deceleration.duration(speed[0], acceleration[0], limits.acceleration, limits.jerk),

@@ -9,7 +9,16 @@ import numpy as np
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
-from dmpcli.records.schemas import EULER_ANGLES, EVENT, JOINTS, POSITION, WRENCH, suffixed
+from dmpcli.records.schemas import (
+    EULER_ANGLES,
+    EVENT,
+    FELT_NORMAL,
+    GOAL,
+    JOINTS,
+    POSITION,
+    WRENCH,
+    suffixed,
+)
 from dmpcli.spatial import rotations
 
 Pose = tuple[Floats, Floats]
@@ -44,6 +53,10 @@ class Row:
         Actual, rad.
     event : str
         Outputs that were switched in this cycle.
+    goal : array, shape (3,), or None
+        To which the stroke is drawn, mm, where it may move.
+    normal : array, shape (3,), or None
+        Of the surface, as estimated.
     """
 
     t: float
@@ -62,6 +75,8 @@ class Row:
     event: str = ""
     force: float = 0.0
     contact: str = ""
+    goal: Floats | None = None
+    normal: Floats | None = None
 
 
 CONTACT = "contact"
@@ -83,6 +98,8 @@ class RunLog:
         How many joint angles the arm tells; 0 where none.
     switching : bool
         Whether outputs are switched.
+    moving : bool
+        Whether the goal may move.
 
     Attributes
     ----------
@@ -97,17 +114,21 @@ class RunLog:
         coupled: bool = False,
         joints: int = 0,
         switching: bool = False,
+        moving: bool = False,
     ) -> None:
         groups = dict.fromkeys(("clock", *_TIMES), 1)
         for name, _ in _POSES:
             turned = oriented or name != "planned"
             groups |= {name: 3} | ({f"{name}_rotation": 9} if turned else {})
-        groups |= ({"wrench": 6} if sensed else {}) | ({"coupling": 1, "fn": 1} if coupled else {})
+        groups |= ({"wrench": 6} if sensed else {}) | (
+            {"coupling": 1, "fn": 1, "normal": 3} if coupled else {}
+        )
+        groups |= {"goal": 3} if moving else {}
         self._joints = joints if joints <= len(JOINTS) else 0
         groups |= {"joints": self._joints} if self._joints else {}
         texts = [EVENT] if switching else []
         self._texts = ("state", "phase", "id", *texts, *([CONTACT] if coupled else []))
-        self._switching = switching
+        self._switching, self._moving = switching, moving
         self.rows = RowBuffer(groups, self._texts)
         self._oriented, self._sensed, self._coupled = oriented, sensed, coupled
 
@@ -128,7 +149,9 @@ class RunLog:
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
         if self._coupled:
-            felt += (row.coupling, row.force)
+            felt += (row.coupling, row.force, np.nan if row.normal is None else row.normal)
+        if self._moving:
+            felt += (np.nan if row.goal is None else row.goal,)
         if self._joints:
             told = row.joints is not None and len(row.joints) == self._joints
             felt += (row.joints if told and row.joints is not None else np.nan,)
@@ -163,6 +186,10 @@ def columns(rows: RowBuffer) -> dict[str, AnyArray]:
         out["coupling"] = rows.numbers("coupling")
     if "fn" in rows.groups:
         out["fn"] = rows.numbers("fn")
+    if "normal" in rows.groups and np.isfinite(rows.numbers("normal")).any():
+        out |= dict(zip(FELT_NORMAL, rows.numbers("normal").T, strict=True))
+    if "goal" in rows.groups:
+        out |= dict(zip(GOAL, rows.numbers("goal").T, strict=True))
     if "joints" in rows.groups:
         angles = rows.numbers("joints").reshape(len(rows), -1)
         out |= dict(zip(JOINTS, angles.T, strict=False))

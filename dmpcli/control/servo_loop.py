@@ -21,6 +21,7 @@ from dmpcli.control.cycle import (
     StoppedAtOnce,
 )
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.guards import LAG
 from dmpcli.control.outputs import OutputSwitch, failed
 from dmpcli.control.plan_cursor import PlanCursor
@@ -54,6 +55,8 @@ class PlanLoop(ControlLoop):
         What is drawn after `plan`, each from where the one before it rests.
     outputs : OutputSwitch, optional
         What switches outputs along the plans.
+    goals : GoalFollower, optional
+        What moves the goal of `plan`, the only one then.
 
     Attributes
     ----------
@@ -71,6 +74,7 @@ class PlanLoop(ControlLoop):
         The force coupling, where there is one.
     log : RunLog
         One row per cycle; it is there whatever goes wrong.
+    goals : GoalFollower or None
 
     Raises
     ------
@@ -91,6 +95,7 @@ class PlanLoop(ControlLoop):
         hindrance: Callable[[], DmpError | None] = lambda: None,
         then: Sequence[Plan] = (),
         outputs: OutputSwitch | None = None,
+        goals: GoalFollower | None = None,
     ) -> None:
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
@@ -106,9 +111,16 @@ class PlanLoop(ControlLoop):
             )
         self._touch, self._limits = touch, limits
         self._outputs, self._owed, self._switched = outputs, 0, ""
+        self.goals = goals
+        if goals is not None and not self.STREAMS:
+            raise InputError(
+                "--goal-from: moves each set-point as it is sent, and this robot plays the whole "
+                "plan by itself; leave mode=file out of --robot"
+            )
         self._draw(plan)
         sensed, pressed = touch is not None, self.pressing is not None
-        self.log = RunLog(plan.oriented, sensed, pressed, arm.joints, outputs is not None)
+        switching, moving = outputs is not None, goals is not None
+        self.log = RunLog(plan.oriented, sensed, pressed, arm.joints, switching, moving)
 
     def run(self, interruption: Interruption) -> LoopOutcome:
         """Go on until the arm rests at the end, or a reason to stop; the arm is stopped after.
@@ -167,7 +179,10 @@ class PlanLoop(ControlLoop):
         self._start()
         # To start may take seconds.
         self._heed()
-        check_start(self._arm.servo.state(), self.plan, self._limits)
+        state = self._arm.servo.state()
+        check_start(state, self.plan, self._limits)
+        if self.goals is not None:
+            self.goals.begin(state.joints)
 
     def _next(self, cycle: Cycle, owed: bool = False) -> Pose:
         if owed:
@@ -177,6 +192,10 @@ class PlanLoop(ControlLoop):
         if self._interruption.count or self._hindrance() is not None or self._lost:
             self._switched += self._outputs.off() if self._outputs is not None else ""
             self._brake()
+        elif self.goals is not None and not owed:
+            moved = self.goals.step(cycle.due, self._cursor.index)
+            if moved is not None:
+                self._follow(moved)
         setpoint = self._setpoint(cycle)
         if self._outputs is not None and not self._cursor.waiting and not self._cursor.braking:
             self._owed = self._owed + 1 if owed else 0
@@ -233,6 +252,17 @@ class PlanLoop(ControlLoop):
         self.plan, self._counted = plan, False
         self._cursor = PlanCursor(plan, self._limits, wait=pressed)
         self._arrival = ArrivalMonitor(plan, watch.arrival, watch.arrival_angle, pressed)
+
+    def _follow(self, plan: Plan) -> None:
+        """Go on with a plan that is the same up to here, and whose end has moved."""
+        self.duration += plan.period * (len(plan) - len(self.plan))
+        self.plan = plan
+        self._cursor.follow(plan)
+        self._arrival.follow(plan)
+        if self.pressing is not None:
+            self.pressing.follow(plan)
+        if self._outputs is not None:
+            self._outputs.follow(plan)
 
     def _look(self, state: RobotState) -> None:
         """See how far the arm has come; count the stroke once it has had the time, or rests."""
@@ -297,6 +327,8 @@ class PlanLoop(ControlLoop):
                 id=self.plan.id if draws else None,
                 joints=state.joints,
                 event=switched,
+                goal=None if self.goals is None else self.goals.goal,
+                normal=self.pressing.sense.estimate if self.pressing and draws else None,
             ),
         )
         if failure is not None:
@@ -355,4 +387,4 @@ class ServoLoop(PlanLoop):
             return pressing.retreat(index, t)
         if cycle.wrench is None:
             return pressing.hold(index)
-        return pressing.displace(index, cycle.wrench, t)
+        return pressing.displace(index, cycle.wrench, t, cycle.state.position)

@@ -48,6 +48,8 @@ class GeneralizeOptions:
         What becomes of a stroke that leaves the surface, or comes where it may not be.
     force : float or None
         With which the tool shall press along the normal where it is in contact, N.
+    compiled : bool
+        Whether by compiled kernels: quicker, and the same but for rounding.
     """
 
     rate: float = 50.0
@@ -65,6 +67,7 @@ class GeneralizeOptions:
     keep_off: KeepOff | None = None
     on_border: OnBorder = "fail"
     force: float | None = None
+    compiled: bool = False
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dmpcli.dmp.time_scaling import Timing, timing
 from dmpcli.errors import InputError
 from dmpcli.surfaces.plane import Plane, pair_charts
 from dmpcli.surfaces.surface import Charts, Status, Surface
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 
 def draw(
@@ -72,6 +73,8 @@ def draw_blocks(
     InputError
         The skill's own numbers overflow.
     """
+    if style.compiled and isinstance(surface, TriangleMesh):
+        surface = surface.with_kernels
     over = turned_over(skill, pairs, surface)
     for seconds in np.unique(duration):
         when = timing(
@@ -134,6 +137,7 @@ def _drawn(
             style.orientation if style.inclination is None else "surface",
             style.size,
             style.inclination,
+            style.compiled,
         )
     lift, count = drawn.lift, len(pairs)
     asked: float | Floats | None = style.force

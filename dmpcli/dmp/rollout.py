@@ -120,6 +120,7 @@ def roll_out(
     orientation: Orientation = "keep",
     size: float = 1.0,
     inclination: Inclination | None = None,
+    compiled: bool = False,
 ) -> Trajectories:
     """Draw a skill at new pairs: modified DMP (9)-(11) in charts, original (4)-(8) in the base.
 
@@ -140,6 +141,8 @@ def roll_out(
         Of a closed stroke, beside the demonstrated one.
     inclination : Inclination, optional
         How the tool leans; without it as it was taught.
+    compiled : bool
+        Whether orientations are worked out by kernels.
 
     Returns
     -------
@@ -158,12 +161,14 @@ def roll_out(
         position = lift.position
         frames = skill.frame.axes[None, None]
         if orientation == "surface":
-            frames = lift.axes if lift.axes.shape[1] == 1 else smoothed(lift.axes, position)
+            frames = lift.axes
+            if frames.shape[1] > 1:
+                frames = smoothed(frames, position, compiled=compiled)
     euler = None
     if skill.oriented:
         turn = _turn(skill, pairs, frames, turned=orientation == "surface" and lift is not None)
         turn = _ending(skill, turn, scale, shared)
-        euler = np.broadcast_to(_euler(turn, shared, scale), position.shape)
+        euler = np.broadcast_to(_euler(turn, shared, scale, compiled), position.shape)
         if inclination is not None and lift is not None:
             leaning = frames if orientation == "surface" else lift.axes
             euler = inclined(euler, leaning, position, inclination)
@@ -374,7 +379,7 @@ def _turn(skill: Skill, pairs: Pairs, frames: Floats, turned: bool = False) -> _
     return _Turn(frames, begin, goal)
 
 
-def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
+def _euler(turn: _Turn, shared: Floats, scale: Floats, compiled: bool = False) -> Floats:
     """Tool orientations R(t) = C(t) E(t) C(0)ᵀ R(0) as unwrapped angles, shape (1 or B, T, 3).
 
     C is the demonstration's chart for `keep`, the pair's for `surface`; the original model turns
@@ -386,6 +391,8 @@ def _euler(turn: _Turn, shared: Floats, scale: Floats) -> Floats:
     angles = turn.goal[:, None] * shared[_GOAL][:, None] + scale[:, None, 3:] * shared[5:].T
     E = rotations.from_euler(angles)
     E = E @ turn.begin[:, None]
+    if compiled and not turn.alike:
+        return rotations.euler_of_paths(turn.frames, E)
     if len(E) == 1 and turn.frames.shape[1] == 1:
         return rotations.euler_of_products(turn.frames[:, 0], E[0])
     return rotations.to_euler_continuous(turn.frames @ E)

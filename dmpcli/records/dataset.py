@@ -1,7 +1,7 @@
 """A batch read part by part: its table of pairs, and the trajectories of one part at a time."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -99,6 +99,27 @@ class Piece:
     @cached_property
     def _filled(self) -> set[str]:
         return {name for name, column in self.columns.items() if not np.isnan(column).all()}
+
+
+def part_of(batch: BatchFolder, part: int) -> BatchFolder:
+    """Return what a batch knows of one part alone, by its place in `BatchFolder.files`."""
+    rows = batch.rows_of(part)
+    none = batch.status.slice(0, 0)
+
+    def own(values: Floats | None) -> Floats | None:
+        return None if values is None else values[rows]
+
+    return replace(
+        batch,
+        ids=batch.ids.take(pa.array(rows)),
+        part=np.zeros(len(rows), dtype=np.int64),
+        start=own(batch.start),
+        goal=own(batch.goal),
+        normal=own(batch.normal),
+        files=[batch.files[part]],
+        status=none,
+        others=none,
+    )
 
 
 def read(folder: Path) -> tuple[BatchFolder, list[str]]:

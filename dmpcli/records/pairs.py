@@ -18,7 +18,7 @@ from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
 START = ("x0", "y0", "z0")
-GOAL = ("xg", "yg", "zg")
+GOAL = schemas.GOAL
 START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
 

@@ -50,6 +50,8 @@ FORCE = ("fx", "fy", "fz")
 TORQUE = ("tx", "ty", "tz")
 WRENCH = FORCE + TORQUE
 NORMAL = ("nx", "ny", "nz")
+GOAL = ("xg", "yg", "zg")
+FELT_NORMAL = ("nx_felt", "ny_felt", "nz_felt")
 DRAWN_ON = ("drawn_on", "surface_sha256")
 JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6", "q7")
 """Of an arm with fewer joints the first ones; no arm with more is logged."""
@@ -130,6 +132,8 @@ RUN = Schema(
         "phase": Column("1", "approach, stroke, retract, transfer or stop", "string"),
         "id": Column("1", "the stroke that is drawn; none between strokes", "string", False),
     }
+    | {n: Column("1", "unit normal of the surface as felt", required=False) for n in FELT_NORMAL}
+    | {n: Column("mm", "the goal that the stroke is drawn to", required=False) for n in GOAL}
     | {n: Column("rad", "actual joint angle", required=False) for n in JOINTS}
     | {EVENT: Column("1", "outputs that were switched in this cycle", "string", False)},
 )

@@ -4,16 +4,22 @@ Nothing here grows with the batch but a few numbers per stroke; what every strok
 goes into CSV files as it is measured.
 """
 
+<<<<<<< HEAD
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+=======
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+>>>>>>> main
 from typing import TextIO
 
 import numpy as np
+import pyarrow as pa
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.messages import Advance
 from dmpcli.metrics import paper_values
-from dmpcli.records.dataset import BatchFolder, states_of
+from dmpcli.records.dataset import BatchFolder, facts_of, part_of, states_of
 from dmpcli.reporting.batch_measures import (
     FIGURES,
     MeasuredBlock,
@@ -135,12 +141,106 @@ class MeasuredBatch:
         return [found[row] for row in rows]
 
 
+@dataclass(frozen=True)
+class MeasuredStrokes:
+    """What is kept of some strokes: it goes from process to process.
+
+    Attributes
+    ----------
+    rows : array of int, shape (k,)
+        Of the batch.
+    table : array, shape (k, len(FIGURES))
+    shown : dict of ReportedStroke
+        Those that are drawn, by row.
+    waves, strokes : str
+        Lines of both CSV files.
+    """
+
+    rows: Integers
+    table: Floats
+    shown: dict[int, ReportedStroke]
+    waves: str
+    strokes: str
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How the strokes of a batch are measured, the same for all of its parts.
+
+    Attributes
+    ----------
+    label : str
+        What to call the batch.
+    sight : MeasurementContext
+        What to measure against.
+    told : bool
+        Whether each stroke's own numbers are wanted as lines of CSV.
+    """
+
+    label: str
+    sight: MeasurementContext
+    told: bool
+
+    def here(self, batch: BatchFolder, chosen: Integers) -> Iterator[MeasuredStrokes]:
+        """Measure a batch in this process, of which `chosen` rows are drawn, on several threads."""
+        for some in measured_parts(batch, self.label, self.sight):
+            yield self._kept(some, batch, chosen)
+
+    def part(self, batch: BatchFolder, chosen: Integers) -> MeasuredStrokes:
+        """Measure one part, as `part_of` gives it, on this thread."""
+        found = [
+            self._kept(some, batch, chosen)
+            for some in measured_parts(batch, self.label, self.sight, threads=1)
+        ]
+        shown: dict[int, ReportedStroke] = {}
+        for some in found:
+            shown |= some.shown
+        return MeasuredStrokes(
+            np.concatenate([some.rows for some in found]),
+            np.concatenate([some.table for some in found]),
+            shown,
+            "".join(some.waves for some in found),
+            "".join(some.strokes for some in found),
+        )
+
+    def _kept(self, some: MeasuredBlock, batch: BatchFolder, chosen: Integers) -> MeasuredStrokes:
+        drawn = np.flatnonzero(np.isin(some.rows, chosen)).tolist()
+        shown = {int(some.rows[i]): some.stroke(i) for i in drawn}
+        if not self.told:
+            return MeasuredStrokes(some.rows, some.table, shown, "", "")
+        ids = batch.ids.take(pa.array(some.rows)).to_pylist()
+        waves = "".join(_wave_rows(some, self.label, ids))
+        strokes = "".join(_stroke_rows(some, self.label, ids, batch))
+        return MeasuredStrokes(some.rows, some.table, shown, waves, strokes)
+
+    def apart(self, batch: BatchFolder) -> "Measurement":
+        """Return it so that it can go to another process: the skill's view of the recording alone.
+
+        All parts of a batch are drawn by one skill.
+        """
+        sight = self.sight.of_drawn(facts_of(batch))
+        if sight.reference is not None:
+            sight = replace(sight, reference=replace(sight.reference, seen_by=None), _others={})
+        return replace(self, sight=sight)
+
+
+Measure = Callable[
+    [Measurement, BatchFolder, Iterator[tuple[BatchFolder, Integers]]], Iterator[MeasuredStrokes]
+]
+"""Measures parts in other processes, and gives what they found back in their order."""
+
+
 def measure(
     batch: BatchFolder,
     label: str,
     sight: MeasurementContext,
     tables: Tables | None,
+<<<<<<< HEAD
     advance: Advance,
+=======
+    advance: Callable[[int], None],
+    elsewhere: Measure | None = None,
+>>>>>>> main
 ) -> MeasuredBatch:
     """Measure all strokes of a batch.
 
@@ -155,6 +255,8 @@ def measure(
         Files for the numbers of every stroke.
     advance : Advance
         Told how many strokes are done.
+    elsewhere : callable, optional
+        Measures parts in other processes; what is found does not depend on it.
 
     Raises
     ------
@@ -163,19 +265,36 @@ def measure(
     """
     many = MeasuredBatch(batch, label, sight, np.full((len(batch), len(FIGURES)), np.nan))
     chosen = _chosen(batch)
+    how = Measurement(label, sight, tables is not None)
+    if elsewhere is None or len(batch.files) < 2:
+        found = how.here(batch, chosen)
+    else:
+        found = _by_parts(batch, chosen, how, elsewhere)
     shown: dict[int, ReportedStroke] = {}
-    for some in measured_parts(batch, label, sight):
+    for some in found:
         many.table[some.rows] = some.table
-        for i in np.flatnonzero(np.isin(some.rows, chosen)).tolist():
-            shown[int(some.rows[i])] = some.stroke(i)
+        shown |= some.shown
         if tables is not None:
-            ids = batch.ids.take(some.rows).to_pylist()
-            tables.waves.writelines(_wave_rows(some, label, ids))
+            tables.waves.write(some.waves)
             assert tables.strokes is not None
-            tables.strokes.writelines(_stroke_rows(some, label, ids, batch))
+            tables.strokes.write(some.strokes)
         advance(len(some.rows))
     many.shown = [shown[row] for row in sorted(shown)]
     return many
+
+
+def _by_parts(
+    batch: BatchFolder, chosen: Integers, how: Measurement, elsewhere: Measure
+) -> Iterator[MeasuredStrokes]:
+    """Measure parts in other processes: each gets its own rows of the table alone."""
+    own = [batch.rows_of(part) for part in range(len(batch.files))]
+    tasks = (
+        (part_of(batch, part), np.flatnonzero(np.isin(rows, chosen)))
+        for part, rows in enumerate(own)
+    )
+    for rows, found in zip(own, elsewhere(how.apart(batch), batch, tasks), strict=True):
+        shown = {int(rows[i]): stroke for i, stroke in found.shown.items()}
+        yield replace(found, rows=rows[found.rows], shown=shown)
 
 
 def _chosen(batch: BatchFolder) -> Integers:

@@ -15,12 +15,14 @@ from dmpcli.arrays import AnyArray, Booleans, Floats, Integers
 from dmpcli.dmp.contact_heights import ContactHeights
 from dmpcli.errors import InputError
 from dmpcli.metrics.deviation import Taught
+from dmpcli.metrics.many_on_surface import TaughtHeights
 from dmpcli.metrics.motion import motions
 from dmpcli.metrics.wave_height import ManyWaves, many_waves
 from dmpcli.records import dataset, schemas, tolerance_mark
 from dmpcli.records import learning_record as lessons
 from dmpcli.records.dataset import BatchFolder, Piece
 from dmpcli.records.learning_record import Lesson
+from dmpcli.reporting import placed_block
 from dmpcli.reporting import stroke_measures as measured
 from dmpcli.reporting.report_surface import AT_ONCE, Grounds, ReportSurface, placed
 from dmpcli.reporting.stroke import LEAST, ReportedStroke, as_drawn
@@ -129,9 +131,22 @@ class MeasurementContext:
         d = self.drawn
         return Taught(at.t, as_drawn(at.chart, d.over, d.size, d.turn))
 
+    @cached_property
+    def heights(self) -> TaughtHeights | None:
+        """Heights of the demonstration over a surface, as they were to be drawn."""
+        at = self.reference
+        if at is None or at.chart is None or at.closed or at.elsewhere:
+            return None
+        phase = (at.t - at.t[0]) / (at.t[-1] - at.t[0])
+        return TaughtHeights(phase, as_drawn(np.asarray(at.chart), self.drawn.over))
+
 
 def measured_parts(
-    batch: BatchFolder, label: str, sight: MeasurementContext, only: Integers | None = None
+    batch: BatchFolder,
+    label: str,
+    sight: MeasurementContext,
+    only: Integers | None = None,
+    threads: int | None = None,
 ) -> Iterator[MeasuredBlock]:
     """Measure the strokes of a batch, in an order that follows its parts.
 
@@ -143,6 +158,8 @@ def measured_parts(
     sight : MeasurementContext
     only : array of int, optional
         Only these rows of the batch.
+    threads : int, optional
+        By default one to a core, up to four.
 
     Raises
     ------
@@ -165,6 +182,8 @@ def measured_parts(
                         some = those[first : first + size]
                         yield partial(_measured, batch, piece, some, t, label, sight, number)
 
+    if threads == 1:
+        return (task() for task in tasks())
     return _in_turn(tasks())
 
 
@@ -348,14 +367,60 @@ class _Block:
         self._compare(column, self.known, place[:, self.known], self._stretch())
         if self.ground is None:
             return MeasuredBlock(self.rows, self.role, table, self.t, waves, self._stroke)
-        strokes = placed(
-            [self._stroke(i) for i in range(len(self.rows))],
-            self.ground,
-            self.sight.reference,
+        at = self.sight.reference
+        length = 1.0 if at is None else at.length
+        lies = placed_block.placed(
+            self._as_block(), self.ground.surface, self.sight.heights, length
         )
-        self._place(column, strokes)
-        waves = ManyWaves.joined([stroke.wave for stroke in strokes])
-        return MeasuredBlock(self.rows, self.role, table, self.t, waves, strokes.__getitem__)
+        for key, values in lies.figures.items():
+            column[f"surface_{key}"][:] = values
+        # On a curved surface waves are measured, and strokes compared, along it.
+        if self._curved():
+            waves = lies.waves
+            column["wave_height"][:], column["wave_spread"][:] = waves.mean, waves.spread
+            self._compare_along(column, lies)
+        return MeasuredBlock(self.rows, self.role, table, self.t, waves, self._placed_stroke)
+
+    def _curved(self) -> bool:
+        """Whether no plane of theirs counts, see `report_surface.placed`."""
+        assert self.ground is not None
+        return self.ground.curved and bool(self.facts.get("model") != "original")
+
+    def _placed_stroke(self, i: int) -> ReportedStroke:
+        assert self.ground is not None
+        return placed([self._stroke(i)], self.ground, self.sight.reference)[0]
+
+    def _as_block(self) -> placed_block.Block:
+        """Return what is measured of them on a surface."""
+        count = len(self.rows)
+        up = None
+        if self.piece.has(*schemas.EULER_ANGLES):
+            rx, ry, _ = self._three(schemas.EULER_ANGLES)
+            cosine = np.cos(ry)
+            # The third column of the rotation, backwards.
+            up = np.stack([-np.sin(ry), np.sin(rx) * cosine, -np.cos(rx) * cosine], axis=-1)
+        side = np.full((count, 3), np.nan)
+        if self.batch.normal is not None:
+            side = self.batch.normal[self.rows].copy()
+        unknown = ~np.isfinite(side).all(axis=1)
+        if self.facts.get("normal") is not None:
+            side[unknown] = self.facts["normal"]
+        elif unknown.any() and self.piece.has(*schemas.NORMAL):
+            side[unknown] = self._three(schemas.NORMAL)[:, unknown, 0].T
+        elif up is not None:
+            side[unknown] = up[unknown, 0]
+        else:
+            side[unknown] = [0.0, 0.0, 1.0]
+        return placed_block.Block(
+            self.t,
+            np.ascontiguousarray(self.position.transpose(1, 2, 0)),
+            self.start,
+            self.goal,
+            side,
+            up,
+            self.closed,
+            self.facts.get("model") != "original",
+        )
 
     def _aims(self) -> tuple[Floats, Floats]:
         """Points where the strokes should begin and end, shape (k, 3) each, mm."""
@@ -390,33 +455,18 @@ class _Block:
         column["phase_rms"][which] = found.phase_rms
         column["phase_max"][which] = found.phase_max
 
-    def _place(self, column: dict[str, Floats], strokes: Sequence[ReportedStroke]) -> None:
-        """Fill in how the strokes lie on the surface; on a curved one they are compared there."""
-        for i, stroke in enumerate(strokes):
-            row = measured.on_surface(stroke) or {}
-            for key in measured.ON_SURFACE:
-                value = row.get(key)
-                column[f"surface_{key}"][i] = np.nan if value is None else value
-            mean, spread = stroke.wave.mean, stroke.wave.spread
-            column["wave_height"][i] = np.nan if mean is None else mean
-            column["wave_spread"][i] = np.nan if spread is None else spread
-        curved = np.array([stroke.axes is None for stroke in strokes])
-        if not curved.any() or self.sight.reference is None:
+    def _compare_along(self, column: dict[str, Floats], lies: placed_block.PlacedBlock) -> None:
+        """Compare strokes with the demonstration along the surface, where they have a chart."""
+        at = self.sight.reference
+        if at is None:
             return
         for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
-            column[name][curved] = np.nan
-        feet = [(s.footing.place, s.footing.length) if s.footing else (None, None) for s in strokes]
-        charted = np.array(
-            [
-                bool(c) and p is not None and not self.sight.reference.closed
-                for c, (p, _) in zip(curved, feet, strict=True)
-            ]
-        )
-        if not charted.any():
+            column[name][:] = np.nan
+        if at.closed:
             return
-        place = np.stack([p.T for p, _ in _picked(feet, charted)], axis=1)
-        lengths = np.array([length for _, length in _picked(feet, charted)])
-        self._compare(column, charted, place, lengths / self.sight.reference.length)
+        charted = lies.charted
+        stretch = lies.lengths[charted] / at.length
+        self._compare(column, charted, lies.place[:, charted], stretch)
 
     def _stroke(self, i: int) -> ReportedStroke:
         """Return one of the strokes as it is drawn."""
@@ -463,7 +513,3 @@ class _Block:
             turn=self.sight.drawn.turn,
             mark=tolerance_mark.of_facts(self.facts),
         )
-
-
-def _picked(values: Sequence[Any], which: Booleans) -> list[Any]:
-    return [value for value, chosen in zip(values, which, strict=True) if chosen]

@@ -63,6 +63,38 @@ def table(rows: Sequence[tuple[str, Row]]) -> Table:
     return made
 
 
+def coupled_table(rows: Sequence[tuple[str, Row]]) -> Table | None:
+    """Return the table of what force couplings held; None where there was none.
+
+    Parameters
+    ----------
+    rows : sequence of (str, dict)
+        As of `table`; those of a coupling have its own figures.
+    """
+    held = [(name, row) for name, row in rows if "rms_error" in row]
+    if not held:
+        return None
+    title = "What the force coupling held: N, N/mm, s, degrees"
+    made = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    made.add_column("run", overflow="fold")
+    for name in ("contact", "RMS", "limited", "landing", "k", "delay", "lean", "friction"):
+        made.add_column(name, justify="right", no_wrap=True)
+    for name, row in held:
+        lean = row.get("normal_angle")
+        made.add_row(
+            name,
+            f"{100.0 * row['share']:.2f} %",
+            tables.number(row["rms_error"], 3),
+            f"{100.0 * row['saturated']:.1f} %",
+            tables.number(row.get("landing_peak"), 2),
+            tables.number(row.get("stiffness"), 2),
+            tables.number(row.get("delay"), 3),
+            tables.number(None if lean is None else float(np.degrees(lean["mean"])), 1),
+            tables.number(row.get("friction"), 2),
+        )
+    return made
+
+
 def _normals(run: Record) -> Floats | None:
     """Unit normals on the tool's side, shape (n, 3)."""
     facts, rotation = run.provenance.facts, run.rotation()

@@ -246,6 +246,9 @@ def _runs(report: Row) -> Iterator[list[Table | str]]:
     pressed = [(e["file"], e["contact"]) for e in report["files"] if e["contact"]]
     if pressed:
         yield [contact.table(pressed)]
+        held = contact.coupled_table(pressed)
+        if held is not None:
+            yield [held]
     pairs = [entry["pose_error"] for entry in report["files"] if entry["pose_error"]]
     if pairs:
         yield [pose_errors.table(pairs), *pose_errors.remarks(pairs)]

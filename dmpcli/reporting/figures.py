@@ -12,6 +12,7 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.records.record import Record
 from dmpcli.reporting import batch_figures, drawing, pose_errors, ruling, run_figures
 from dmpcli.reporting.batch import MeasuredBatch
+from dmpcli.reporting.contact_figure import contact_figure
 from dmpcli.reporting.curve_names import name_of, named, short
 from dmpcli.reporting.drawing import PlottedCurve, curve_of
 from dmpcli.reporting.part_figure import PlacedCurve, part_figure
@@ -42,7 +43,16 @@ MOST_RUNS = 3
 FAR = 4.0
 """A demonstration that would make a picture so many times larger is left out of it."""
 
-NAMES = ("plane", "time", "surface", "force", "deadlines", "pose_error", "spread_demonstrations")
+NAMES = (
+    "plane",
+    "time",
+    "surface",
+    "force",
+    "contact",
+    "deadlines",
+    "pose_error",
+    "spread_demonstrations",
+)
 """What the files of the figures begin with, beside ``batch_``."""
 
 
@@ -384,6 +394,14 @@ def _runs(shown: Shown) -> list[ReportFigure]:
             )
             made = _numbered("force", number)
             found.append(shown.saved(made, f"{short(name)}: how hard it pressed", text, figure))
+        coupled = contact_figure(run)
+        if coupled is not None:
+            text = (
+                "What the force coupling felt, wanted and did. e is added along the planned "
+                "normal, positive away from the work; the path is the tool's, in its own plane."
+            )
+            made = _numbered("contact", number)
+            found.append(shown.saved(made, f"{short(name)}: contact", text, coupled))
         ahead = 1e3 * float(run.provenance.facts.get("lookahead") or 0.0)
         text = (
             "Lateness is the time from when a set-point was due until it was sent. The arm is "

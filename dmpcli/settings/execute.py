@@ -96,6 +96,8 @@ class ExecuteSettings(Settings):
         Positive,
         Option("What the tool file may miss of the reading at rest; torque at 0.1 m.", "N"),
     ] = 1.5
+    # How far from the planned goal one that is told while the stroke runs may lie, mm.
+    goal_range: Positive = 200.0
     # Of a marking pen; a polishing pad wants more.
     force_setpoint: Annotated[
         Positive | None,
@@ -119,6 +121,12 @@ class ExecuteSettings(Settings):
         Le(100),
         Option("Share of a stroke in contact that counts as drawn.", "%"),
     ] = 95.0
+    normal_from_force: Annotated[
+        bool, Option("Hold the force along the surface's own normal, as friction and motion show.")
+    ] = False
+    # How far that may lean from the planned normal, rad, and how fast it may turn, rad/s.
+    normal_angle: Annotated[float, Ge(0.001), Le(0.7)] = 0.175
+    normal_rate: Positive = 0.175
     # None of them is by the rule of `admittance.force_law`, from what the landing has measured.
     coupling_mass: Positive | None = None
     coupling_damping: Positive | None = None

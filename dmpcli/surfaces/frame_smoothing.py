@@ -15,7 +15,9 @@ WIDTH = 1.5
 _PASSES = 3
 
 
-def smoothed(axes: Floats, position: Floats, width: float = WIDTH) -> Floats:
+def smoothed(
+    axes: Floats, position: Floats, width: float = WIDTH, compiled: bool = False
+) -> Floats:
     """Frames smoothed along their paths.
 
     Parameters
@@ -27,6 +29,8 @@ def smoothed(axes: Floats, position: Floats, width: float = WIDTH) -> Floats:
     width : float
         Standard deviation, mm; 0 leaves the frames alone. Over a crease that turns the frame by
         an angle A the steepest turn is about 0.4 A per `width` of path.
+    compiled : bool
+        Whether by kernels.
 
     Returns
     -------
@@ -35,6 +39,10 @@ def smoothed(axes: Floats, position: Floats, width: float = WIDTH) -> Floats:
     """
     if width <= 0.0 or axes.shape[1] < 3:
         return axes
+    if compiled:
+        from dmpcli.surfaces.kernels import smoothing
+
+        return smoothing.smoothed(axes, position, width, _PASSES)
     values = np.concatenate([axes[..., 1], axes[..., 2]], axis=-1)
     values = smoothed_vectors(values, position, width)
     n = unit(values[..., 3:])

@@ -7,7 +7,12 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import across, cross, dot, length, turned
-from dmpcli.surfaces import geodesic_search, geodesic_stepping, straightest_geodesics
+from dmpcli.surfaces import (
+    compiled_stepping,
+    geodesic_search,
+    geodesic_stepping,
+    straightest_geodesics,
+)
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 # Steps of the centre line are no longer than this, mm, and there are at least four.
@@ -105,15 +110,13 @@ def take_aim(origin: Floats, normal: Floats, goal: Floats, sign: Floats, part: I
 
 def by_steps(mesh: TriangleMesh, aim: Aim) -> Ends:
     """Shoot along the smooth normal."""
-    front, _ = geodesic_stepping.start(
-        mesh,
-        aim.origin,
-        aim.normal,
-        aim.direction,
-        aim.length / aim.steps[:, None],
-        aim.sign,
-        aim.part,
-    )
+    step = aim.length / aim.steps[:, None]
+    begun = aim.origin, aim.normal, aim.direction, step, aim.sign, aim.part
+    if mesh.compiled:
+        front, _ = compiled_stepping.start(mesh, *begun)
+        sharp, off = compiled_stepping.walk(mesh, front, aim.steps)
+        return Ends(front.position, front.direction, front.normal, sharp, off)
+    front, _ = geodesic_stepping.start(mesh, *begun)
     ends = Ends.unknown(len(aim.steps))
     sharp, off = ends.sharp.copy(), ends.off.copy()
     active = np.arange(len(aim.steps))

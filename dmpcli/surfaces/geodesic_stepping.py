@@ -17,11 +17,11 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import across, cross, dot, length, turned, unit
 from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
 
-_SHARP = np.cos(np.radians(CREASE))
+SHARP = np.cos(np.radians(CREASE))
 # The other side of a wall, or another fold of the surface: its normal is turned by more than 120°.
-_BACK = -0.5
+BACK = -0.5
 # A closest point further off than this part of the step is not the surface that was walked on.
-_JUMP = 0.3
+JUMP = 0.3
 # A walk that crossed a hole lands off its course by less than this part of the hole's width; the
 # length is then wrong by about a thousandth of it.
 LANDING = 0.05
@@ -121,7 +121,7 @@ def _probe(
     """Normals (M, 3) at the closest points, and whether (M, 1) the surface goes on there."""
     position, face = mesh.search(points)
     there = sign * mesh.smooth_normals(position, face)
-    good = dot(there, normal)[:, 0] > _SHARP
+    good = dot(there, normal)[:, 0] > SHARP
     good &= (mesh.components[face] == part) & ~mesh.beyond_border(points, position, face)
     return there, good[:, None]
 
@@ -139,11 +139,11 @@ def advance(mesh: TriangleMesh, front: Front) -> tuple[Front, Marks]:
     after = front.sign * mesh.smooth_normals(foot, face)
     turn = dot(after, n)[:, 0]
     gap = length(foot - guess)[:, 0]
-    back = turn < _BACK
+    back = turn < BACK
     other = (mesh.components[face] != front.part) | back
-    sharp = ~other & (turn < _SHARP)
+    sharp = ~other & (turn < SHARP)
     # A walk that comes back from beyond a hole must land where it was heading.
-    allowed = np.where(was_off, LANDING * front.away, _JUMP * h[:, 0])
+    allowed = np.where(was_off, LANDING * front.away, JUMP * h[:, 0])
     jump = gap > np.maximum(allowed, mesh.reach[face])
     off = other | mesh.beyond_border(guess, foot, face) | (~sharp & jump)
     mark = off[:, None]

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces import strip_inverse
+from dmpcli.surfaces.mesh_charts import MeshCharts
 from dmpcli.surfaces.plane import PlaneCharts
 from dmpcli.surfaces.surface import Charts, Status
 from dmpcli.surfaces.tangential import NEAR, Sought, solved
@@ -69,8 +71,10 @@ class Inverse:
 def invert(charts: Charts, position: Floats) -> Inverse:
     """Find chart coordinates of positions on or off a surface.
 
-    On planes exactly; elsewhere u and v are sought until the line along the chart's normal meets
-    the position, by damped Newton steps on the gap's parts along e_u and e_v. They begin at the
+    On planes exactly. Strokes on a mesh, within `strip_inverse.HIGHEST` of it, are found on the
+    nodes of their strips, see there; all others, and those that are not found so as a whole, by a
+    search that lifts what it tries: u and v are sought until the line along the chart's normal
+    meets it, by damped Newton steps on the gap's parts along e_u and e_v. They begin at the
     nearest point of the centre line; where that fails, at the nearest of a grid over the chart,
     then beside neighbours that were found. Turns about a part are counted on along the stroke.
 
@@ -127,6 +131,43 @@ def _flat(charts: PlaneCharts, position: Floats) -> Inverse:
 
 
 def _curved(charts: Charts, given: Floats) -> Inverse:
+    if not isinstance(charts, MeshCharts):
+        return _by_steps(charts, given)
+    whole = strip_inverse.found(charts, given)
+    whole = whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
+    rest = np.setdiff1d(np.arange(len(given)), whole.rows)
+    result = _of_strips(whole, given.shape[:2])
+    if len(rest):
+        part = _by_steps(charts.rows(rest), given[rest])
+        result.coordinates[rest], result.axes[rest] = part.coordinates, part.axes
+        result.reached[rest], result.miss[rest] = part.reached, part.miss
+        result.status[rest] = part.status
+    return result
+
+
+def _of_strips(whole: strip_inverse.Found, shape: tuple[int, ...]) -> Inverse:
+    """Put strokes that were found on strips where they belong among others."""
+    result = Inverse(
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, 3, 3), np.nan),
+        np.zeros(shape, dtype=bool),
+        np.full(shape, np.nan),
+        np.full(shape[0], np.int64(Status.DRAWN)),
+    )
+    result.coordinates[whole.rows], result.miss[whole.rows] = whole.coordinates, whole.miss
+    result.axes[whole.rows], result.reached[whole.rows] = whole.axes, True
+    return result
+
+
+def _jumps(coordinates: Floats, position: Floats) -> Booleans:
+    """Tell which strokes (R, T, 3) seem to go on at another turn about the part, shape (R,)."""
+    step = np.linalg.norm(np.diff(coordinates[..., :2], axis=1), axis=-1)
+    way = np.linalg.norm(np.diff(position, axis=1), axis=-1)
+    return np.asarray((step > _JUMP * way + _LEAST_JUMP).any(axis=1))
+
+
+def _by_steps(charts: Charts, given: Floats) -> Inverse:
+    """Find coordinates by steps with a lift each."""
     over = charts.over(given)
     # A search for what lies beside the surface would lead far off it: neighbours stand in.
     position = _between(given, over)

@@ -32,7 +32,7 @@ def walk(mesh: TriangleMesh, origin: Floats, direction: Floats, length: Floats) 
     flat = mesh.face_normals[hits.face]
     heading = across(turned(tangent, hits.normal, flat), flat) * backward
     state = GeodesicState(hits.position.copy(), heading, hits.face.copy())
-    arrived = _run(mesh, state, np.abs(size))
+    arrived = (_run_compiled if mesh.compiled else _run)(mesh, state, np.abs(size))
     normal = mesh.smooth_normals(state.position, state.face)
     flat = mesh.face_normals[state.face]
     ahead = across(turned(state.heading, flat, normal), normal) * backward
@@ -80,6 +80,17 @@ def _run(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Boolean
         state.heading[active] = unit(part * along + out * cross(along, mesh.face_normals[after]))
         state.face[active] = after
         entry[active] = np.argmax(neighbours[after] == before[:, None], axis=1)
+    return arrived
+
+
+def _run_compiled(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Booleans:
+    from dmpcli.surfaces.kernels import facet_walks, tree
+
+    facets, order = mesh.facets, mesh.for_kernels.rows
+    rows = order[state.face]
+    walks = state.position, state.heading, rows, remaining
+    arrived = facet_walks.run(facets.reals, facets.numbers, *walks, MOST_FACETS)
+    state.face = facets.numbers[rows, tree.FACE].astype(np.int64)
     return arrived
 
 

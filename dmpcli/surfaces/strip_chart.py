@@ -14,7 +14,7 @@ from dmpcli.spatial.vectors import across, dot, length
 from dmpcli.surfaces import geodesic_stepping
 from dmpcli.surfaces.strip_grid import Centre, Grid, Nodes, corners, walk_nodes
 from dmpcli.surfaces.surface import Status
-from dmpcli.surfaces.triangle_mesh import TriangleMesh
+from dmpcli.surfaces.triangle_mesh import ON_BORDER, TriangleMesh
 
 # Steps across the centre line are no longer than this, mm.
 STEP = 6.5
@@ -99,33 +99,23 @@ def _grids(u: Floats, v: Floats) -> Integers:
 def _lift_alike(
     mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, u: Floats, v: Floats
 ) -> Samples:
-    i, r = _cell(u / centre.step + grid.behind, grid.behind + grid.ahead)
-    j, s = _cell(v / cross_step + grid.right, grid.right + grid.left)
+    along, aside = u / centre.step + grid.behind, v / cross_step + grid.right
+    i = _cell(along, grid.behind + grid.ahead)
+    j = _cell(aside, grid.right + grid.left)
     pair = np.arange(len(u))[:, None]
     cells = np.zeros((len(u), grid.behind + grid.ahead, grid.right + grid.left), dtype=bool)
     cells[pair, i, j] = True
     nodes = walk_nodes(mesh, centre, grid, cross_step, cells)
-    point, e_v = _bicubic(nodes, pair, i, j, r, s)
-    flat = point.reshape(-1, 3)
-    found, face = mesh.search(flat)
-    sign = np.repeat(centre.sign, u.shape[1], axis=0)
-    normal = (sign * mesh.smooth_normals(found, face)).reshape(point.shape)
-    foot = found.reshape(point.shape)
-    elsewhere = mesh.components[face] != np.repeat(centre.part, u.shape[1])
-    beyond = (elsewhere | mesh.beyond_border(flat, found, face)).reshape(u.shape)
-    nearest = pair, i + (r > 0.5), j + (s > 0.5)
-    near = nodes.normal[nearest]
-    back = ~beyond & (dot(normal, near)[..., 0] < 0.0)
-    allowed = np.maximum(
-        mesh.reach[face].reshape(u.shape), geodesic_stepping.LANDING * nodes.away[pair, i, j]
-    )
-    far = ~beyond & (length(point - foot)[..., 0] > allowed)
+    if mesh.compiled:
+        feet = _feet_compiled(mesh, centre, nodes, along, aside)
+    else:
+        feet = _feet(mesh, centre, nodes, (i, along - i), (j, aside - j))
     touched = corners(cells)
     status = np.select(
         [
-            _any(back) | _any(nodes.back & touched),
-            _any(beyond),
-            _any(far),
+            _any(feet.back) | _any(nodes.back & touched),
+            _any(feet.beyond),
+            _any(feet.far),
             _any((nodes.stretch < LEAST_STRETCH) & touched),
         ],
         [np.int64(s) for s in (Status.OTHER_SIDE, Status.BORDER, Status.LOST, Status.FOLDED)],
@@ -133,18 +123,84 @@ def _lift_alike(
     )
     sharp = _any(nodes.sharp & touched)
     slivers, stretched = mesh.developable.slivers, mesh.developable.stretched
-    better = _any(slivers[face].reshape(u.shape)) & ~_any(stretched[face].reshape(u.shape))
+    better = _any(slivers[feet.face]) & ~_any(stretched[feet.face])
     return Samples(
-        foot,
-        across(e_v, normal),
-        normal,
-        face.reshape(u.shape),
-        nodes.stretch[nearest],
-        beyond | far,
+        feet.foot,
+        feet.across,
+        feet.normal,
+        feet.face,
+        feet.stretch,
+        feet.beyond | feet.far,
         status,
         sharp,
         better,
     )
+
+
+@dataclass(frozen=True)
+class _Feet:
+    """Samples (B, T) on the mesh, as `Samples` says it, and what each met.
+
+    `beyond` the border, `far` from the mesh, or, `back`, on a surface that faces away.
+    """
+
+    foot: Floats
+    across: Floats
+    normal: Floats
+    face: Integers
+    stretch: Floats
+    beyond: Booleans
+    far: Booleans
+    back: Booleans
+
+
+def _feet(
+    mesh: TriangleMesh,
+    centre: Centre,
+    nodes: Nodes,
+    u: tuple[Integers, Floats],
+    v: tuple[Integers, Floats],
+) -> _Feet:
+    """Carry samples, by cells and shares (B, T), through the patches onto the mesh."""
+    (i, r), (j, s) = u, v
+    pair = np.arange(len(i))[:, None]
+    point, e_v = _bicubic(nodes, pair, i, j, r, s)
+    flat = point.reshape(-1, 3)
+    found, face = mesh.search(flat)
+    sign = np.repeat(centre.sign, i.shape[1], axis=0)
+    normal = (sign * mesh.smooth_normals(found, face)).reshape(point.shape)
+    foot = found.reshape(point.shape)
+    elsewhere = mesh.components[face] != np.repeat(centre.part, i.shape[1])
+    beyond = (elsewhere | mesh.beyond_border(flat, found, face)).reshape(i.shape)
+    nearest = pair, i + (r > 0.5), j + (s > 0.5)
+    back = ~beyond & (dot(normal, nodes.normal[nearest])[..., 0] < 0.0)
+    face = face.reshape(i.shape)
+    allowed = np.maximum(mesh.reach[face], geodesic_stepping.LANDING * nodes.away[pair, i, j])
+    far = ~beyond & (length(point - foot)[..., 0] > allowed)
+    return _Feet(foot, across(e_v, normal), normal, face, nodes.stretch[nearest], beyond, far, back)
+
+
+def _feet_compiled(
+    mesh: TriangleMesh, centre: Centre, nodes: Nodes, along: Floats, aside: Floats
+) -> _Feet:
+    """Carry samples (B, T), counted in nodes, through the patches onto the mesh."""
+    from dmpcli.surfaces.kernels import samples
+
+    shape = along.shape
+    foot, e_v, normal = (np.empty((*shape, 3)) for _ in range(3))
+    beyond, far, back = np.empty((3, *shape), dtype=bool)
+    feet = _Feet(foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back)
+    samples.lift(
+        mesh.facets,
+        samples.Strip(nodes.values, nodes.normal, nodes.stretch, nodes.away),
+        along,
+        aside,
+        centre.sign,
+        centre.part,
+        samples.Limits(ON_BORDER, geodesic_stepping.LANDING),
+        samples.Feet(foot, e_v, normal, feet.face, feet.stretch, beyond, far, back),
+    )
+    return feet
 
 
 def _any(marks: Booleans) -> Booleans:
@@ -152,10 +208,9 @@ def _any(marks: Booleans) -> Booleans:
     return np.asarray(marks.reshape(len(marks), -1).any(axis=1))
 
 
-def _cell(at: Floats, cells: int) -> tuple[Integers, Floats]:
-    """Cell of each position, counted in steps from the first node, and the share within it."""
-    i = np.clip(np.floor(at).astype(np.int64), 0, cells - 1)
-    return i, at - i
+def _cell(at: Floats, cells: int) -> Integers:
+    """Cell of each position, counted in steps from the first node."""
+    return np.clip(np.floor(at).astype(np.int64), 0, cells - 1)
 
 
 def _hermite(s: Floats) -> tuple[Floats, Floats]:

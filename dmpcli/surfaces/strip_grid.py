@@ -6,7 +6,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, unit
-from dmpcli.surfaces import geodesic_stepping
+from dmpcli.surfaces import compiled_stepping, geodesic_stepping
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 # Central fourth-order differences, and their one-sided forms for the two nodes at either end.
@@ -209,7 +209,8 @@ class _Lines:
         Walks that begin off the mesh are bent as walk `source` (M,) is, which begins on it.
         """
         rows = np.flatnonzero((counts[0] > 0) | (counts[1] > 0))
-        fronts = geodesic_stepping.start(
+        begin = compiled_stepping.start if mesh.compiled else geodesic_stepping.start
+        fronts = begin(
             mesh,
             self.position[rows, at],
             self.normal[rows, at],
@@ -232,6 +233,10 @@ class _Lines:
         way: int,
         count: Integers,
     ) -> None:
+        if mesh.compiled:
+            out = self.position, self.direction, self.normal, self.away, self.sharp, self.back
+            compiled_stepping.walk_lines(mesh, front, (rows, count), (at, way), out)
+            return
         for k in range(1, int(count.max(initial=0)) + 1):
             on = count[rows] >= k
             if not on.all():

@@ -20,6 +20,7 @@ from dmpcli.control import (
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
+from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
 from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.control.workcell import Workcell
@@ -35,6 +36,7 @@ from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import RUN
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.wrench import Tool
+from dmpcli.workflows import moving_goals
 from dmpcli.workflows.run_output import (
     FinishedRun,
     RunOutput,
@@ -78,6 +80,8 @@ class ExecutionRequest:
         Let the controller play the plan, though the arm draws on if the link is lost.
     ignore_events : bool
         Draw without switching the outputs that the file asks for.
+    goal_from : str or None
+        A file of goals over time or a URL to listen on, where the goal may move.
     """
 
     trajectory: str | Source
@@ -94,6 +98,7 @@ class ExecutionRequest:
     dry_run: bool = False
     allow_file_mode: bool = False
     ignore_events: bool = False
+    goal_from: str | None = None
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,14 @@ def check_said(said: Mapping[str, Any], feels: bool, presses: bool) -> None:
     InputError
         Names the options.
     """
-    for option in ("force_setpoint", "stiffness", "delay", "on_contact_loss", "min_contact"):
+    for option in (
+        "force_setpoint",
+        "stiffness",
+        "delay",
+        "on_contact_loss",
+        "min_contact",
+        "normal_from_force",
+    ):
         if option in said and not presses:
             raise InputError(
                 f"--{option.replace('_', '-')}: nothing presses without --coupling force"
@@ -158,6 +170,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     check_output(request, repeatable)
     tool_file = None if request.tool is None else file_io.read(request.tool)
     batch = _found(request)
+    moving = moving_goals.wanted(request.goal_from, batch, settings)
     _warn_of(batch, _name(request.trajectory))
     coupling = execution.coupling_of(batch, settings) if request.presses else None
     realtime = request.realtime or not repeatable
@@ -180,6 +193,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         tool=held,
     )
     guards.check_playing(bench.robot, request.allow_file_mode or keeper is None)
+    moving.check_streams(bench.robot)
     outputs.check(bench.robot, outputs.names_of(batch.strokes))
     if bench.note:
         tell(bench.note)
@@ -190,7 +204,8 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         robot = watched(robot)
     lock = ownership.ArmLock(addresses[0], moves=keeper is not None)
     lock.take()
-    teller = LaterTeller(realtime and request.presses and keeper is not None)
+    waits = request.presses or request.goal_from is not None
+    teller = LaterTeller(realtime and waits and keeper is not None)
     try:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
@@ -204,20 +219,30 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         execution_plan.refuse_any(judged)
         if keeper is None:
             return Execution(judged, None)
+        moving.open()
         loop = _loop(
-            bench, arm, judged, settings, request, coupling, tool_file, keeper, batch, teller
+            bench,
+            arm,
+            judged,
+            settings,
+            request,
+            coupling,
+            tool_file,
+            keeper,
+            batch,
+            teller,
+            moving.follower(judged[0].plan, settings, reach, teller.say),
         )
         simulated = bench.simulated or loop.virtual
         provenance = _provenance(settings, request, batch, tool_file, simulated)
+        provenance = moving.noted(provenance)
         provenance.facts.update(execution.facts_of(arm, coupling))
         outcome, made = _stream(loop, provenance, realtime, keeper, reach)
     finally:
+        moving.close()
         closing = guards.leave(robot.close, bench.sensor.close, lock.release, teller.close)
     with stopping.outranking(lambda: outcome.stop):
-        if realtime:
-            tell(str(loop.timing))
-        if loop.pressing is not None:
-            tell(execution.pressed(loop.pressing))
+        _tell_of(loop, realtime)
         outcome = outcome.unless(closing)
         if (outcome.failure or outcome.signal) and keeper.kept:
             tell(f"{_output(keeper.output)}: {len(loop.log)} rows kept")
@@ -225,6 +250,16 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         if closing is None and execution_plan.lifts(batch, settings):
             left = execution_plan.rest_of(batch, loop.drawn)
         return Execution(judged, _finished(outcome, made, request, left))
+
+
+def _tell_of(loop: PlanLoop, realtime: bool) -> None:
+    """Say how punctual the loop was, how hard it pressed and what goals it followed."""
+    if realtime:
+        tell(str(loop.timing))
+    if loop.pressing is not None:
+        tell(execution.pressed(loop.pressing))
+    if loop.goals is not None:
+        tell(loop.goals.said())
 
 
 def _found(request: ExecutionRequest) -> StrokeSelection:
@@ -303,6 +338,7 @@ def _loop(
     keeper: RunOutput,
     batch: StrokeSelection,
     teller: LaterTeller,
+    goals: GoalFollower | None,
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
@@ -312,7 +348,7 @@ def _loop(
         check = None if tool_file is None else settings.tool_check
         policy = None
         if coupling is not None:
-            policy = execution.policy_of(batch, settings, arm.info.lookahead)
+            policy = execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
         touch = execution.touch(
             bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )
@@ -327,7 +363,7 @@ def _loop(
         assert isinstance(arm.servo, OutputSwitching)
         switch = outputs.OutputSwitch(arm.servo, settings.period, arm.info.lookahead)
     limits = limits_of(settings)
-    return kind(plans[0], limits, watch, arm, touch, keeper.hindrance, plans[1:], switch)
+    return kind(plans[0], limits, watch, arm, touch, keeper.hindrance, plans[1:], switch, goals)
 
 
 def _tool(bench: Workcell, tool_file: Source | None) -> Tool:

@@ -39,6 +39,7 @@ from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows import recording
+from dmpcli.workflows.report_jobs import Processes
 from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -103,6 +104,7 @@ def report(
     paper: bool = False,
     view: bool = False,
     png: bool = False,
+    jobs: int = 1,
 ) -> StrokeReport:
     """Compare strokes, write the report's folder where one is named, and tell what is doubtful.
 
@@ -127,6 +129,8 @@ def report(
         Whether to write a part that can be turned, too.
     png : bool
         Whether to write the figures as PNG, too.
+    jobs : int
+        Processes that measure large batches; no figure depends on it.
 
     Raises
     ------
@@ -152,7 +156,7 @@ def report(
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
         sight = MeasurementContext(reference_of(parts), ground, normal, grounds=grounds)
-        parts = _measured(parts, sight, tables)
+        parts = _measured(parts, sight, tables, jobs)
         if not paper:
             parts = _compared(parts)
         made = document.document(parts, said, paper)
@@ -334,9 +338,10 @@ def _tables(output: Path | None, batches: bool) -> Iterator[Tables | None]:
 
 
 def _measured(
-    parts: list[DocumentPart], sight: MeasurementContext, tables: Tables | None
+    parts: list[DocumentPart], sight: MeasurementContext, tables: Tables | None, jobs: int
 ) -> list[DocumentPart]:
     """Measure large batches, and write down the wave heights of all strokes."""
+    elsewhere = Processes(jobs) if jobs > 1 else None
     done = []
     total = sum(len(part.batch) for part in parts if part.batch)
     with progress("measuring", total) as advance:
@@ -346,7 +351,7 @@ def _measured(
                 if tables is not None:
                     write_waves(part.strokes, tables.waves)
                 continue
-            many = measure(part.batch, part.name, sight, tables, advance)
+            many = measure(part.batch, part.name, sight, tables, advance, elsewhere)
             done.append(replace(part, strokes=many.shown, many=many))
     return done
 

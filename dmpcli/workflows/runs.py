@@ -87,6 +87,7 @@ def execute(
     tool: str | Path | None = None,
     robot_model: str | None = None,
     coupling: Literal["force"] | None = None,
+    goal_from: str | Path | None = None,
     dry_run: bool = False,
     realtime: bool = False,
     allow_mixed: bool = False,
@@ -110,6 +111,8 @@ def execute(
         URLs.
     dry_run : bool
         Move nothing; return each stroke as planned, with its checks.
+    goal_from : str or Path, optional
+        Where the goal moves meanwhile: a file, or ``udp://HOST:PORT``.
     tool, robot_model, coupling, realtime, allow_mixed, allow_file_mode, force, preset, config
         As the options of ``dmpcli execute``.
     **settings
@@ -144,6 +147,7 @@ def execute(
             force,
             dry_run,
             allow_file_mode,
+            goal_from=None if goal_from is None else str(goal_from),
         )
         done = executing.execute(resolved, request)
     if done.run is None:

@@ -40,6 +40,7 @@ def sensed(tool, rotation, external):
     return np.concatenate([R.T @ force, R.T @ torque]) + zero
 
 
+@pytest.mark.slow
 @given(seeds)
 def test_the_external_wrench_comes_back_under_any_attitude(seed):
     rng = np.random.default_rng(seed)

@@ -61,8 +61,8 @@ def test_gains_by_the_rule_are_stable_with_some_to_spare(stiffness, delay, perio
 
 def test_for_a_pure_delay_the_bound_is_the_known_one():
     """In continuous time an integrator k/(D s) behind a delay L is stable below D = 2 k L / π."""
-    bound = smallest_damping(3.0, 0.2, 0.001)
-    assert bound == pytest.approx(2.0 / math.pi * 3.0 * 0.2, rel=0.02)
+    bound = smallest_damping(3.0, 0.1, 0.001)
+    assert bound == pytest.approx(2.0 / math.pi * 3.0 * 0.1, rel=0.02)
 
 
 def test_a_growing_loop_is_told_from_a_dying_one_by_its_eigenvalue():
@@ -89,6 +89,7 @@ def test_at_its_largest_speed_nothing_winds_up():
     assert abs(state.integral) <= 5.0 * PERIOD + 1e-12
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 50.0), st.floats(0.01, 0.3), st.floats(0.5, 20.0), st.floats(-15.0, 15.0))
 def test_when_e_has_ended_what_it_added_decays_and_the_goal_is_reached(k, delay, tau, e):
     """Over random stable gains: e is held, released, and the filter of eq. (10) forgets it."""

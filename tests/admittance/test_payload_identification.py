@@ -150,6 +150,7 @@ def test_the_standard_errors_are_those_of_many_repetitions():
         np.testing.assert_allclose(rms, values.std(axis=0), rtol=0.25)
 
 
+@pytest.mark.slow
 def test_the_residual_over_a_free_motion_is_below_a_tenth_of_a_newton():
     """A motion of at most 0.2 m/s², the tool's inertia included, after the low-pass of `record`."""
     t = np.arange(0, 1000) / 100.0
@@ -175,6 +176,7 @@ def visited(n=12):
     return np.concatenate([R[::2], R[1::2]]), 5.0 * np.arange(n)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_a_zero_that_drifts_evenly_is_found_as_it_is_at_the_end(seed):
     R, t = visited()

@@ -1,12 +1,14 @@
 """A table is cut into parts from its words alone: every row once, few surfaces, one stand-off."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.batch import cut
 
 
+@pytest.mark.slow
 @given(st.integers(1, 60), st.integers(1, 70))
 def test_without_surfaces_the_order_is_that_of_the_table(rows, size):
     found = cut.in_order(rows, size)

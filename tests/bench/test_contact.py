@@ -21,6 +21,7 @@ from tests.extras_here import needs
 pytestmark = needs(BENCH)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [0.5, 2.0, 5.0, 20.0, 60.0])
 def test_the_true_force_is_the_pens_spring_and_the_arms_one_after_the_other(k):
     bench, forces = world(pen=Pen(stiffness=k)), []
@@ -35,6 +36,7 @@ def test_the_true_force_is_the_pens_spring_and_the_arms_one_after_the_other(k):
     assert forces[1] - forces[0] == pytest.approx(bench.series_stiffness(normal), rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.0, 10.0])
 def test_a_pen_that_is_pressed_rests(tilt):
     bench = world(Flat(moved(FRAME, 0.0, np.radians(tilt), 0.3)))
@@ -48,6 +50,7 @@ def test_a_pen_that_is_pressed_rests(tilt):
     assert np.linalg.norm(forces[-1]) > 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [0.5, 20.0])
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.6])
 def test_a_pen_that_slides_rubs_by_coulombs_law_and_does_not_rattle(k, mu):
@@ -64,6 +67,7 @@ def test_a_pen_that_slides_rubs_by_coulombs_law_and_does_not_rattle(k, mu):
     assert np.abs(tips[:, 2] - TIP[2]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_friction_never_leaves_its_cone():
     bench = world()
     press(bench, 2.0)
@@ -128,6 +132,7 @@ def test_the_same_seed_reads_the_same_and_another_one_does_not():
     assert not np.allclose(one, other, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("native", "shape"),
     [
@@ -149,6 +154,7 @@ def test_a_surface_by_its_closest_point_pushes_like_mujocos_own(native, shape):
     assert forces[0][:, 2].min() > 1.0
 
 
+@pytest.mark.slow
 def test_on_a_cylinder_the_pen_follows_the_circle():
     bench = world(Round(FRAME, 60.0))
     press(bench, 4.0)
@@ -159,6 +165,7 @@ def test_on_a_cylinder_the_pen_follows_the_circle():
     assert x.max() > 12.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("workpiece", "before", "after"),
     [

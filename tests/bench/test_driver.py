@@ -32,6 +32,7 @@ def instruments(robot="bench://ec66", sensor="bench://ec66", clock=None):
     return arm, driver.sensor(split(sensor, "sensor"), clock), clock
 
 
+@pytest.mark.slow
 def test_robot_and_sensor_keep_the_protocols():
     tool = tool_file.decode(file_io.read(TOOL))
     for arm in ("ec66", "ur5e"):

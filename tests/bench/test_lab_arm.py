@@ -43,6 +43,7 @@ def led(arm, goal, seconds=1.0):
         arm.advance(2e-3)
 
 
+@pytest.mark.slow
 def test_in_the_air_it_comes_to_rest_where_the_joints_without_physics_do():
     goal = joints_at(20.0, -10.0, 30.0)
     springs = JointArm(model("ec66"), PEN, joints_at())
@@ -54,6 +55,7 @@ def test_in_the_air_it_comes_to_rest_where_the_joints_without_physics_do():
     assert np.abs(physics.speeds).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ground", [PLATE, facing(Plane(TIP, -UP), TIP + UP, -UP)])
 def test_the_lab_feels_the_parts_stiffness_as_that_of_the_pen(ground):
     lab = VirtualLab(setting(ground=ground, physics=BenchArm), clock=lambda: 0.0)

@@ -227,6 +227,7 @@ def test_poses_taken_before_a_failure_are_kept(tmp_path):
     assert 2 <= len(taken) < 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("save", [True, False])
 def test_poses_of_real_instruments_are_kept_though_nobody_asked(save, tmp_path, monkeypatch):
     from dmpcli.control import workcell

@@ -121,6 +121,7 @@ def test_twenty_loops_keep_their_height(lab, regression):
     assert not warnings(said)
 
 
+@pytest.mark.slow
 def test_two_hundred_waves_keep_their_height_by_ridge(lab):
     document, _, drawn, recorded = learned(lab, "waves", "--regression", "ridge")
     assert abs(height(drawn) - 40.0) <= 0.2
@@ -135,6 +136,7 @@ def test_two_hundred_waves_keep_their_height_by_lwr_or_ridge_is_named(lab):
     assert abs(height(drawn) - 40.0) <= 0.2 or told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("regression", ["lwr", "ridge"])
 def test_thirty_letters_are_legible(lab, regression):
     _, _, drawn, recorded = learned(lab, "letters", "--regression", regression)
@@ -142,6 +144,7 @@ def test_thirty_letters_are_legible(lab, regression):
     assert ends(drawn, recorded) <= 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("regression", "largest"), [("lwr", 1.0), ("ridge", 0.6)])
 def test_thirty_corners_stay_sharp(lab, regression, largest):
     _, _, drawn, recorded = learned(lab, "corners", "--regression", regression)
@@ -172,6 +175,7 @@ def test_a_wall_that_leans_gives_the_same_wave(lab, lean):
     np.testing.assert_allclose(position[:, 1], 0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_two_walls_that_lean_either_way_are_one_wave(lab):
     skill, said = lab.fit("walls", tables=[cases.wall(-3), cases.wall(3)])
     at = pair([500, 0, 0], [800, 0, 0])
@@ -183,6 +187,7 @@ def test_two_walls_that_lean_either_way_are_one_wave(lab):
     assert not warnings(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leans", [(-3,), (-1,), (1,), (3,), (-3, 3), (3, -3)])
 def test_a_closed_letter_on_a_wall_that_leans_is_the_same_letter(lab, leans):
     skill, _ = lab.fit(f"letter{leans}", tables=[cases.wall_letter(lean) for lean in leans])
@@ -196,6 +201,7 @@ def test_a_closed_letter_on_a_wall_that_leans_is_the_same_letter(lab, leans):
     assert position[len(position) // 4, 2] > 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("oriented", [False, True])
 def test_a_lifted_pen_writes_on_the_plate_and_is_lifted_between(lab, oriented):
     skill, _ = lab.fit(f"lift{oriented}", tables=[cases.pen_lift(oriented)])
@@ -218,6 +224,7 @@ def test_a_seam_over_a_hump_rises_wherever_it_leads(lab, goal):
     assert z.max() == pytest.approx(1.2, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y"])
 @pytest.mark.parametrize("degrees", [-30, 30])
 def test_a_tool_held_aslant_tilts_no_plane_and_is_told(lab, degrees, axis):
@@ -264,6 +271,7 @@ def test_a_stroke_taught_just_off_the_surface_is_drawn_in_contact_and_told(lab):
 # Timing, rests, noise.
 
 
+@pytest.mark.slow
 def test_one_path_at_four_timings_is_that_path(lab):
     tables = [cases.timing(name) for name in cases.TIMINGS]
     skill, said = lab.fit("timing", tables=tables)
@@ -273,6 +281,7 @@ def test_one_path_at_four_timings_is_that_path(lab):
     assert "timing_3.csv: rests from" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
 @pytest.mark.parametrize("seed", [7, 8])
 def test_idle_ends_are_trimmed_at_any_noise(lab, noise, seed):
@@ -282,6 +291,7 @@ def test_idle_ends_are_trimmed_at_any_noise(lab, noise, seed):
     assert re.search(r"trimmed [67]\.\d+ s and [67]\.\d+ s", said)
 
 
+@pytest.mark.slow
 def test_noise_is_not_drawn(lab):
     share = np.linspace(0.0, 1.0, 2001)
     true = cases.wave(cases.jerk(share))
@@ -302,6 +312,7 @@ def test_noise_is_not_drawn(lab):
     assert max(missed) <= 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_uneven_stamps_never_overshoot(lab, seed):
     table = cases.uneven(np.random.default_rng(seed))
@@ -318,6 +329,7 @@ MADE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", MADE)
 def test_noise_of_part_of_the_band_is_told_and_its_remedy_smooths(lab, made):
     table = MADE[made]()
@@ -337,6 +349,7 @@ def test_noise_of_part_of_the_band_is_told_and_its_remedy_smooths(lab, made):
 # Parts of a recording that belong to no stroke.
 
 
+@pytest.mark.slow
 def test_a_pause_is_told_with_its_times_and_cut_on_request(lab):
     _, said, _, _ = learned(lab, "pause", seed=7)
     [line] = warnings(said)
@@ -351,6 +364,7 @@ def test_a_pause_is_told_with_its_times_and_cut_on_request(lab):
     assert not warnings(said)
 
 
+@pytest.mark.slow
 def test_approach_and_retract_are_told_with_the_times_to_cut_at(lab):
     _, said, _, _ = learned(lab, "approach")
     start = float(re.search(r"--from (\S+) leaves it out", said)[1])
@@ -506,6 +520,7 @@ def test_a_convex_sheet_drawn_on_a_plate_is_told_to_hover(lab):
     assert "fit --surface" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("oriented", [True, False])
 def test_a_stroke_taught_on_one_flank_of_a_cylinder_is_drawn_on_its_outside_everywhere(
     lab, oriented

@@ -46,6 +46,7 @@ def lay_out(folder):
     u = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
     wave = np.column_stack([t, 0.3 + 0.11 * u, 0.024 * np.sin(2 * np.pi * u), 0.0 * u])
     rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in wave)
+    (folder / "goals.csv").write_text("t,x,y,z\n0.5,-800,133,-17.5\n3,-805,128,-17.5\n")
     (folder / "log.csv").write_text(f"time,tx,ty,tz\n{rows}\n")
     (folder / "drawing.svg").write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="50mm" viewBox="0 0 100 50">'

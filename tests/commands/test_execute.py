@@ -111,6 +111,7 @@ def test_standard_input_and_output(traj, tmp_path):
     assert piped.read_bytes() == (tmp_path / "named.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_half_the_speed_takes_twice_the_time(traj, tmp_path):
     execute(traj, "-o", tmp_path / "run.parquet", "--speed", 0.5)
     run = run_of(tmp_path / "run.parquet")
@@ -257,6 +258,7 @@ def test_a_force_that_is_none_is_named_by_row(tmp_path, force):
     assert "column 'fn', row 7" in said
 
 
+@pytest.mark.slow
 def test_the_trajectorys_own_force_is_pressed_and_its_lifted_part_is_not(tmp_path):
     cols = columns()
     t = np.asarray(cols["t"])
@@ -348,6 +350,7 @@ def batch(tmp_path):
     return folder
 
 
+@pytest.mark.slow
 def test_one_stroke_of_a_batch_is_picked_by_id(batch, tmp_path):
     out = tmp_path / "run.parquet"
     assert "3 mm off the plane" in refused(batch, "-o", out, "--id", "c", code=2, output=out)
@@ -440,6 +443,7 @@ def test_a_sensor_that_falls_silent_stops_the_run(traj, tmp_path):
     assert 2.8 < run_of(out).t[-1] < 3.2
 
 
+@pytest.mark.slow
 def test_a_tool_file_without_zero_has_it_taken_at_rest(traj, tmp_path):
     file = tmp_path / "tool.json"
     file.write_bytes(tool.encode(PEN.with_zero(None)))
@@ -459,6 +463,7 @@ def test_a_force_over_the_limit_stops_the_run(traj, tmp_path):
     assert len(run_of(out)) == 1
 
 
+@pytest.mark.slow
 def test_a_sensor_is_logged_compensated(traj, tmp_path):
     """The plate pushes back up with 5 N/mm times 1 mm; tool weight and zero are gone."""
     out = tmp_path / "run.parquet"
@@ -494,6 +499,7 @@ def test_force_coupling_holds_the_set_point_on_a_plate_a_millimetre_off(traj, tm
     assert gains["tau"] == 5.0
 
 
+@pytest.mark.slow
 def test_behind_a_long_look_ahead_the_coupling_is_slowed_and_it_is_said(traj, tmp_path):
     out = tmp_path / "run.parquet"
     preset = tmp_path / "slow.toml"
@@ -507,6 +513,7 @@ def test_behind_a_long_look_ahead_the_coupling_is_slowed_and_it_is_said(traj, tm
     assert facts["contact"]["absent"] == 0.0
 
 
+@pytest.mark.slow
 def test_where_there_is_nothing_to_press_on_the_stroke_is_not_drawn(traj, tmp_path):
     out = tmp_path / "run.parquet"
     options = ("--coupling", "force", "--force-setpoint", 5, "--robot", "mock:?plate=none")

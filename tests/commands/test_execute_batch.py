@@ -188,6 +188,7 @@ def test_each_way_keeps_its_own_speed(batch, tmp_path):
     assert 12.0 - 0.05 < away.min() < 13.0
 
 
+@pytest.mark.slow
 def test_the_ids_that_are_asked_for_are_drawn_in_the_order_given(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out, "--id", "d", "--id", "a")
@@ -199,6 +200,7 @@ def test_the_ids_that_are_asked_for_are_drawn_in_the_order_given(batch, tmp_path
     assert roles == ["pairs", "trajectory", "trajectory"]
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bytes(batch, tmp_path):
     for name in ("a", "b"):
         execute(batch, "-o", tmp_path / name, "--id", "a", "--id", "b")
@@ -217,6 +219,7 @@ def test_pairs_without_trajectory_are_named_and_the_others_drawn(tmp_path):
     assert facts["failed"] == [f"f{i}" for i in range(7)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "code", "words"),
     [
@@ -303,6 +306,7 @@ def test_several_strokes_of_one_file_are_drawn_too(tmp_path):
     assert height(run_of(out).position())[run_of(out).columns["phase"] == "transfer"].min() > 19.9
 
 
+@pytest.mark.slow
 def test_a_dry_run_tells_a_line_per_stroke_and_of_many_the_worst(batch, tmp_path):
     said = execute(batch, "--dry-run").stderr.splitlines()
     assert said[0].startswith("4 strokes: ")
@@ -344,6 +348,7 @@ def test_the_coupling_presses_during_strokes_only(batch, tmp_path):
     assert run.provenance.facts["drawn"] == list(PLACES)
 
 
+@pytest.mark.slow
 def test_a_stroke_that_finds_no_contact_ends_the_run_and_says_what_is_left(batch, tmp_path):
     out = tmp_path / "run.parquet"
     options = ("--coupling", "force", "--robot", "mock:?plate=none")
@@ -426,6 +431,7 @@ def test_report_measures_each_stroke_of_a_run(batch, tmp_path):
     assert entry["states"] == {"ok": 4}
 
 
+@pytest.mark.slow
 def test_report_and_inspect_say_what_a_stopped_run_lacks(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out, "--robot", "mock:?estop_at=14", expect=3)

@@ -44,6 +44,7 @@ def test_an_arm_that_cannot_reach_is_not_moved(far, tmp_path):
     assert not (tmp_path / "run.parquet").exists()
 
 
+@pytest.mark.slow
 def test_the_run_of_an_arm_that_reaches_is_that_without_the_check(near, tmp_path):
     for name, options in (("plain", []), ("checked", MODEL)):
         assert execute(near, "-o", tmp_path / name, *options, "-q").exit_code == 0

@@ -55,6 +55,7 @@ def test_the_options_and_the_registry_name_the_same_formats():
     assert tuple(FORMATS) == WORDS
 
 
+@pytest.mark.slow
 def test_a_run_lies_on_its_plan_at_the_same_times(files, tmp_path):
     done = run("export", files / "r.parquet", "-o", tmp_path / "r.csv")
     assert done.exit_code == 0, done.stderr
@@ -85,6 +86,7 @@ def test_a_batch_leaves_as_one_table_or_a_file_of_each(files, tmp_path):
     assert (tmp_path / "one.tum").read_bytes() == (tmp_path / "b-p1.tum").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["csv", "tum", "ply", "obj", "ngc", "script", "src", "mod"])
 def test_the_same_file_gives_the_same_bytes(files, tmp_path, suffix):
     for name in "ab":
@@ -107,6 +109,7 @@ def test_an_arms_joints_leave_by_their_suffix(files, tmp_path):
     assert "--robot-model ec66" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_leaves_with_the_joints_that_its_file_holds(files, tmp_path):
     """By kinematics of the mock's own poses; forward again they are these poses."""
     ran = tmp_path / "r.parquet"
@@ -175,6 +178,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "args",
     [

@@ -105,6 +105,7 @@ def test_copies_lie_beside_the_first_at_their_spacing_along_the_surface(shop, tm
                                        atol=1e-6)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_split_stroke_is_what_lies_beside_the_hole_and_execute_tours_it(shop, tmp_path):
     out = tmp_path / "t.parquet"
     options = ["--surface", shop / "plate.ply"]
@@ -145,6 +146,7 @@ def test_pieces_shorter_than_five_millimetres_are_left_out(shop, tmp_path):
     assert strokes(out)[0]["1.1"][1][:, 0].min() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", ["plane.json", "plate.ply", "box.stl"])
 def test_a_region_is_kept_out_of_or_split_around(shop, tmp_path, surface):
     out = tmp_path / "t.parquet"
@@ -197,6 +199,7 @@ def test_the_tool_s_speed_is_held_and_the_path_is_the_same(shop, tmp_path, surfa
     assert executes(out).exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_speed_that_bends_and_ends_do_not_allow_is_told(shop, tmp_path):
     for speed, told in ((30, False), (400, True)):
         out = tmp_path / f"{speed}.parquet"
@@ -214,6 +217,7 @@ def test_a_speed_that_bends_and_ends_do_not_allow_is_told(shop, tmp_path):
         assert "hold --tool-speed on less than half of their paths" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", ["plane.json", "cylinder.json", "sphere.json", "plate.ply"])
 def test_lead_and_tilt_are_those_against_the_normals_of_the_file(shop, tmp_path, surface):
     y = -38.0

@@ -111,6 +111,7 @@ def strokes_of(folder):
     return found
 
 
+@pytest.mark.slow
 def test_each_stroke_is_the_one_that_is_drawn_alone(shop, drawn, tmp_path):
     strokes = strokes_of(drawn[1])
     for row in rows_of():
@@ -167,6 +168,7 @@ def test_processes_shards_and_kept_meshes_change_no_byte(shop, drawn, tmp_path, 
     assert content(tmp_path / "b") == content(drawn[1])
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_but_not_from_parts_drawn_on_a_surface_that_has_changed(shop, tmp_path):
     job = shutil.copytree(shop / "job", tmp_path / "job")
     table = write(job / "pairs.csv", rows_of())
@@ -207,6 +209,7 @@ def bad_table(job):
     return write(job / "bad.csv", rows)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_read_or_placed_fails_its_rows_by_name(shop, tmp_path):
     job = shutil.copytree(shop / "job", tmp_path / "job")
     told = draw(shop, tmp_path / "b", bad_table(job), "--on-error", "skip")
@@ -220,6 +223,7 @@ def test_what_cannot_be_read_or_placed_fails_its_rows_by_name(shop, tmp_path):
     assert str(tmp_path) not in "".join(found)
 
 
+@pytest.mark.slow
 def test_stop_ends_with_the_first_bad_row_before_anything_is_drawn(shop, tmp_path):
     job = shutil.copytree(shop / "job", tmp_path / "job")
     told = draw(shop, tmp_path / "b", bad_table(job), code=2)
@@ -233,6 +237,7 @@ def test_stop_ends_with_the_first_bad_row_before_anything_is_drawn(shop, tmp_pat
     assert not (tmp_path / "b" / "_manifest.json").exists()
 
 
+@pytest.mark.slow
 def test_the_command_line_fills_what_the_table_leaves_empty(shop, tmp_path):
     rows = [row for row in rows_of() if row["surface"] == "parts/p0.stl" and not row["pose"]]
     both = tmp_path / "both"
@@ -249,6 +254,7 @@ def test_the_command_line_fills_what_the_table_leaves_empty(shop, tmp_path):
             np.testing.assert_array_equal(a[row["id"]][name], b[row["id"]][name])
 
 
+@pytest.mark.slow
 def test_unknown_columns_are_told_once(shop, drawn, tmp_path):
     text = drawn[0].read_text().splitlines()
     (drawn[0].parent / "more.csv").write_text(
@@ -258,6 +264,7 @@ def test_unknown_columns_are_told_once(shop, drawn, tmp_path):
     assert told.count("'colour': no such column is known") == 1
 
 
+@pytest.mark.slow
 def test_options_of_surfaces_say_something(shop, tmp_path):
     flat = tmp_path / "flat.csv"
     flat.write_text("x0,y0,z0,xg,yg,zg\n0,0,0,90,0,0\n")

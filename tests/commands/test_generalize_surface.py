@@ -89,6 +89,7 @@ def test_a_placed_part_and_pair_give_the_placed_stroke(learned, tmp_path):
     np.testing.assert_array_equal(read(tmp_path / "file").position(), there.position())
 
 
+@pytest.mark.slow
 def test_a_mesh_in_metres_is_read_in_metres(learned, tmp_path):
     import trimesh
 
@@ -144,6 +145,7 @@ def test_a_stroke_over_the_border_is_refused_or_clipped(learned, tmp_path):
     assert 2 <= len(read(tmp_path / "t")) < 501
 
 
+@pytest.mark.slow
 def test_with_on_border_skip_only_strokes_over_the_border_are_left_out(learned, tmp_path):
     flat = [-551.03, 131.399, -17.54, -660.021, 130.034, -17.54]
     edge = [-551.0, 180.0, -17.54, -660.0, 180.0, -17.54]  # the bench ends at 185
@@ -182,6 +184,7 @@ def test_a_point_off_the_mesh_is_refused_by_distance(learned, tmp_path):
     assert "off the surface, more than --snap-tol 1" in done.stderr
 
 
+@pytest.mark.slow
 def test_many_pairs_on_a_mesh_equal_each_alone_and_bad_ones_are_named(learned, tmp_path):
     rows = ["id,x0,y0,z0,xg,yg,zg"]
     rows.append("curved," + ",".join(map(str, START + GOAL)))
@@ -224,6 +227,7 @@ def test_wrong_surface_options_are_refused(learned, tmp_path, options, message):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_report_measures_on_the_surface(learned, tmp_path):
     run(learned, "-o", tmp_path / "t", *CURVED, "--surface", BENCH, "--orientation", "surface")
     arguments = ["report", ROOT / "sample_runs/reference.parquet", tmp_path / "t", "--json"]

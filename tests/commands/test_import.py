@@ -43,6 +43,7 @@ def test_what_left_in_doubles_comes_back_to_1e_9(tmp_path, suffix, options):
     assert len(second.provenance.inputs[0]["sha256"]) == 64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["script", "src", "mod", "ngc"])
 def test_a_program_comes_back_within_a_hundredth(tmp_path, suffix):
     there, back = tmp_path / f"o.{suffix}", tmp_path / "b.parquet"
@@ -87,6 +88,7 @@ def test_several_files_become_a_file_each(tmp_path):
     assert (tmp_path / "d-a.parquet").read_bytes() == (tmp_path / "d-b.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_strokes_of_a_program_are_chosen_or_written_one_by_one(tmp_path):
     from dmpcli.formats import urscript
     from dmpcli.formats.toolpath import ProgramOptions
@@ -177,6 +179,7 @@ def test_what_does_not_fit_is_refused(tmp_path, name, text, options, words):
     assert not (tmp_path / "d.parquet").exists()
 
 
+@pytest.mark.slow
 @needs(ROS)
 def test_a_place_that_no_reader_of_demonstrations_takes_is_refused(tmp_path):
     one = wave()

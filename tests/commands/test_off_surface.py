@@ -177,6 +177,7 @@ def registered(lab):
     return lab
 
 
+@pytest.mark.slow
 def test_the_pose_file_tells_the_parts_unit(registered):
     assert json.loads((registered / "pose.json").read_text())["unit"] == "m"
     words = [*ends(IN_BASE), "--surface", "metres.obj", "--surface-pose", "pose.json"]

@@ -58,6 +58,7 @@ def test_a_recording_is_a_demonstration_with_its_provenance(tmp_path):
     assert str(tmp_path) not in repr(p)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_other_ones(tmp_path):
     one, two, other = (tmp_path / f"{name}.parquet" for name in "abc")
     run("-o", one, "--seed", 1, "--duration", 2)
@@ -73,6 +74,7 @@ def test_the_dash_writes_the_file_to_standard_output(tmp_path):
     assert len(decode(Source("standard input", result.stdout_bytes), DEMONSTRATION)) == 101
 
 
+@pytest.mark.slow
 def test_options_beat_the_config_which_beats_the_preset(tmp_path):
     config = tmp_path / "my.toml"
     config.write_text("[record]\nseed = 8\nperiods = 0.5\ndead_band_force = 0.5\n")
@@ -381,6 +383,7 @@ NUMBERS = {
 }
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.sampled_from(sorted(NUMBERS)), st.data())
 def test_no_finite_number_ends_in_a_traceback(option, data):

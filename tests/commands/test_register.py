@@ -75,6 +75,7 @@ def test_point_pairs_give_the_pose(lab):
     assert "least certain" in done.stderr
 
 
+@pytest.mark.slow
 def test_many_points_and_a_rough_pose_in_words_or_in_a_file_give_the_pose(lab):
     done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", *NEAR, "-q")
     assert done.exit_code == 0, done.stderr
@@ -126,6 +127,7 @@ def test_a_residual_above_the_limit_is_refused_by_row_and_nothing_is_written(lab
     assert run("part.stl", "bad.csv", "-o", "pose.json", "--max-residual", 9).exit_code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("args", "words"),
     [
@@ -270,6 +272,7 @@ def test_a_part_that_looks_the_same_turned_over_needs_a_start(lab):
     assert "give a rough pose with --initial" in done.stderr
 
 
+@pytest.mark.slow
 def test_few_points_are_refused_for_their_rival_with_the_place_to_touch(lab):
     rng = np.random.default_rng(0)
     corners, faces = wedge()
@@ -295,6 +298,7 @@ def test_an_error_above_the_limit_is_refused_and_of_pairs_told(wedge_lab):
     assert "more than --max-error 0.01" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [("ax", "ay", "az"), ("rx", "ry", "rz")])
 def test_directions_that_come_out_of_the_part_are_not_used_and_that_is_told(wedge_lab, columns):
     corners, faces = wedge()

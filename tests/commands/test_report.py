@@ -264,6 +264,7 @@ def test_on_a_mesh_modified_and_original_stand_side_by_side(tmp_path, curved):
     assert [row["stroke"] for row in rows] == ["demo", "along", "through"]
 
 
+@pytest.mark.slow
 def test_a_surface_in_its_own_frame_and_unit_is_placed(tmp_path, curved):
     V, F = fillet_mesh()
     # Turned by 90° about z, moved, in metres: the pose says how to get back.
@@ -277,6 +278,7 @@ def test_a_surface_in_its_own_frame_and_unit_is_placed(tmp_path, curved):
     assert entry["strokes"][0]["surface"]["wave_height"] == pytest.approx(49.979, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_batch_on_a_surface_has_statistics_of_it(tmp_path):
     folder = batch(tmp_path / "many", 24)
     plane = tmp_path / "plane.json"

@@ -140,6 +140,7 @@ def test_ids_are_cells_of_their_own(tmp_path):
     assert float(rows[3]["height_mm"]) == pytest.approx(HEIGHTS[3], abs=5e-3)
 
 
+@pytest.mark.slow
 def test_on_a_plane_the_distance_to_it_is_part_of_the_report(tmp_path, demo, folder):
     plane = tmp_path / "plane.json"
     point = [0.0, 0.0, float(START[2]) - 3.0]

@@ -58,6 +58,7 @@ def loose(folder, demo):
     return fitted(folder, "loose", demo, "--basis", 5)
 
 
+@pytest.mark.slow
 def test_skills_are_ranked_by_what_was_recorded(folder, demo, ridge, loose):
     paper = fitted(folder, "paper", demo, "--preset", "paper")
     found = report(demo, loose, paper, ridge)
@@ -94,6 +95,7 @@ def test_a_recording_is_cut_as_the_skill_was_with_or_without_its_file(folder, de
     assert alone["strokes"][0]["duration"] > 8.0
 
 
+@pytest.mark.slow
 def test_the_mark_of_a_skill_is_repeated_by_every_later_command(folder, demo, loose):
     trajectory = drawn(folder, "loose", loose)
     words = "the skill strays from what was demonstrated by RMS"
@@ -113,6 +115,7 @@ def test_the_mark_of_a_skill_is_repeated_by_every_later_command(folder, demo, lo
         assert words in " ".join(run("inspect", file).stdout.split())
 
 
+@pytest.mark.slow
 def test_the_mark_of_a_batch_is_repeated(folder, demo, loose):
     for count in (3, 24):
         pairs = folder / f"pairs-{count}.csv"
@@ -139,6 +142,7 @@ def lifting(folder):
     return demo, skill, plate
 
 
+@pytest.mark.slow
 def test_a_stroke_that_is_meant_to_end_lifted_has_no_goal_error(folder, lifting):
     demo, skill, plate = lifting
     ends = ("--start", 420, 60, 0, "--goal", 540, 80, 0, "--surface", plate)
@@ -155,6 +159,7 @@ def test_a_stroke_that_is_meant_to_end_lifted_has_no_goal_error(folder, lifting)
     assert ran["goal_error"] < 0.1
 
 
+@pytest.mark.slow
 def test_lifted_parts_and_contact_are_told_as_that(folder, lifting):
     demo, skill, plate = lifting
     ends = ("--start", 420, 60, 0, "--goal", 540, 80, 0, "--surface", plate)
@@ -174,6 +179,7 @@ def test_lifted_parts_and_contact_are_told_as_that(folder, lifting):
     assert "2 mm off the surface on purpose" in run("report", above, "--surface", plate).stdout
 
 
+@pytest.mark.slow
 def test_a_batch_with_lifted_ends_has_the_figures_of_its_strokes(folder, lifting):
     demo, skill, plate = lifting
     pairs = folder / "lifted.csv"

@@ -21,12 +21,22 @@ class Plant:
     """A tool on a spring over a surface.
 
     `surface(t)` is its height over the plan, mm, None where there is none; `cycles` delay the
-    command. The sensor reads the mean over the last half period, `bias` beside its zero.
+    command. The sensor reads the mean over the last half period, `bias` beside its zero; of a tool
+    of `mass`, kg, it feels the inertia too, and the arm takes up its command more softly.
     """
 
     def __init__(
-        self, stiffness, cycles=0, lag=0.025, surface=lambda t: 0.0, noise=0.05, seed=0, bias=0.0
+        self,
+        stiffness,
+        cycles=0,
+        lag=0.025,
+        surface=lambda t: 0.0,
+        noise=0.05,
+        seed=0,
+        bias=0.0,
+        mass=0.0,
     ):
+        self.mass, self.half, self.speed = mass, 0.0, 0.0
         self.stiffness, self.lag, self.surface = stiffness, lag, surface
         self.queue = [0.0] * (cycles + 1)
         self.rng = np.random.default_rng([seed, 7])
@@ -42,11 +52,18 @@ class Plant:
         felt = []
         for n in range(SUBSTEPS):
             self.command = before + (target - before) * (n + 1) / SUBSTEPS
-            self.height += (self.command - self.height) * (1.0 - math.exp(-dt / self.lag))
+            goal, lag = self.command, self.lag
+            if self.mass:
+                lag = 0.5 * self.lag
+                self.half += (self.command - self.half) * (1.0 - math.exp(-dt / lag))
+                goal = self.half
+            way = (goal - self.height) * (1.0 - math.exp(-dt / lag))
+            inertia = 1e-3 * self.mass * (way / dt - self.speed) / dt
+            self.height, self.speed = self.height + way, way / dt
             self.t += dt
             h = self.surface(self.t)
             self.force = 0.0 if h is None else self.stiffness * max(h - self.height, 0.0)
-            felt.append(self.force)
+            felt.append(self.force - inertia)
         self.command = target
         mean = float(np.mean(felt[SUBSTEPS // 2 :]))
         return mean + self.bias + self.noise * self.rng.standard_normal()

@@ -51,6 +51,7 @@ def test_only_the_axes_along_the_tool_are_damped_and_the_law_stays_stable():
     np.testing.assert_allclose(leaning.damping[:3] / law.damping[:3], [FACTOR, 1.0, FACTOR])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [5, 20])
 def test_a_calm_recording_raises_no_alarm(stiffness):
     url = f"mock:?stiffness={stiffness}"
@@ -58,6 +59,7 @@ def test_a_calm_recording_raises_no_alarm(stiffness):
     assert recorder.chatter.alarms == []
 
 
+@pytest.mark.slow
 def test_on_a_stiff_plate_behind_a_lagging_servo_the_chatter_is_ended():
     url = "mock:?stiffness=50&lag=0.05"
     _, recorder, outcome = rehearse(url, url)

@@ -42,6 +42,21 @@ def test_the_force_is_held_and_the_contact_measured_at_any_stiffness_and_delay(s
     assert found.landing_peak < (1.5 * 5.0 if stiffness <= 15.0 else 9.0)
 
 
+def test_the_felt_inertia_of_a_heavy_tool_on_a_soft_contact_does_not_make_it_swing():
+    """3 kg on 0.5 N/mm: from 2 Hz on the sensor feels more of the tool than of the contact."""
+    for told, steady in ((3.0, True), (0.0, False)):
+        rig = Rig(Plant(0.5, 0, mass=3.0), tool_mass=told)
+        pairs = rig.land().draw(6.0)
+        swung = "oscillating" in {event.state for event in rig.supervisor.events}
+        assert (not rig.supervisor.failure and not swung and rms(pairs[-100:]) < 0.1) == steady
+
+
+def test_chosen_gains_that_swing_by_the_tools_inertia_are_refused_at_the_landing():
+    gains = ForceGains(PERIOD * 0.06, 0.06, 0.0, np.inf, PERIOD)
+    rig = Rig(Plant(0.5, 0, mass=3.0), gains=gains, tool_mass=3.0).land()
+    assert "unstable on a tool of 3 kg" in rig.supervisor.failure
+
+
 @pytest.mark.parametrize("height", [-5.0, -2.0, 0.0, 2.0, 5.0])
 @pytest.mark.parametrize("stiffness", [2.0, 15.0])
 def test_a_surface_off_the_plan_is_landed_on_gently(height, stiffness):

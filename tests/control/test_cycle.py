@@ -67,6 +67,7 @@ def executed(stall, asleep):
     return loop, loop.run(Interruption()).failure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asleep", [True, False])
 @pytest.mark.parametrize("stall", [0.015, 0.041, 0.049, 0.051, 0.061, 0.069])
 def test_a_stall_ends_both_loops_or_neither_and_they_miss_as_many_deadlines(stall, asleep):

@@ -117,6 +117,7 @@ def test_an_arm_that_does_not_come_to_rest_is_told():
     assert servo.calls[-2:] == ["stop", "close"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [QueueServo, FakeServo])
 def test_a_queue_gets_the_set_points_that_it_is_owed_and_no_other_arm_does(kind):
     class Oversleeping(SimulatedClock):

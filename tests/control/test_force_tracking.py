@@ -98,6 +98,7 @@ class LateArm:
         return forces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lookahead", [0.02, 0.1, 0.2, 0.3, 0.5])
 def test_the_force_settles_without_losing_contact_however_long_the_look_ahead(lookahead):
     arm = LateArm(lookahead)
@@ -114,6 +115,7 @@ def test_it_moves_along_the_normal_only_and_rests_on_the_set_point():
     assert abs(arm.force - 3.0) <= 0.3
 
 
+@pytest.mark.slow
 def test_forces_along_the_surface_do_not_move_it():
     one, other = LateArm(0.05), LateArm(0.05)
     one.settle()

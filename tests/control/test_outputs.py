@@ -155,6 +155,7 @@ def drawn(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_the_mock_arm_is_within_a_period_of_the_place(drawn, tmp_path, speed):
     ended("execute", drawn / "t.parquet", "-o", tmp_path / "r.parquet", "--speed", speed, "-q")
@@ -189,6 +190,7 @@ def test_a_file_without_events_is_of_the_first_version_and_says_nothing_of_them(
     assert "event" not in table.column_names
 
 
+@pytest.mark.slow
 def test_a_batch_switches_in_every_stroke_and_refuses_the_pair_that_is_too_short(drawn, tmp_path):
     pairs = tmp_path / "pairs.csv"
     pairs.write_text("id,x0,y0,z0,xg,yg,zg\na,0,0,0,110,0,0\nb,0,50,0,12,50,0\nc,0,90,0,90,90,0\n")

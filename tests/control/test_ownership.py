@@ -54,6 +54,7 @@ def test_a_host_that_nobody_knows_is_told():
         lock("elite://no.such.host.invalid").take()
 
 
+@pytest.mark.slow
 def test_the_lock_ends_with_its_process_however_that_ends():
     code = (
         "from dmpcli.control.ownership import ArmLock\n"

@@ -405,6 +405,7 @@ def test_a_coupled_run_holds_its_force_and_leaves_the_work_clear():
     assert bench.servo.position[2] > START[2] + 5.5
 
 
+@pytest.mark.slow
 def test_a_stroke_in_the_air_does_not_count_as_drawn():
     """The part ends: its contact is waited for, and the stroke ends in the air."""
     at = drawing()
@@ -417,6 +418,7 @@ def test_a_stroke_in_the_air_does_not_count_as_drawn():
     assert bench.loop.drawn == []
 
 
+@pytest.mark.slow
 def test_where_contact_is_lost_for_good_it_comes_to_rest_and_says_so():
     at = drawing()
     bench = pressing(at={at: lambda servo: setattr(bench.sensor, "plate", -1000.0)})
@@ -427,6 +429,7 @@ def test_where_contact_is_lost_for_good_it_comes_to_rest_and_says_so():
     assert bench.loop.stop_outcome.confirmed
 
 
+@pytest.mark.slow
 def test_a_wall_stops_it_in_the_cycle_that_feels_it():
     at = drawing()
     bench = pressing()
@@ -441,6 +444,7 @@ def test_a_wall_stops_it_in_the_cycle_that_feels_it():
     assert len(bench.servo.sent) == at
 
 
+@pytest.mark.slow
 def test_a_signal_on_the_stroke_freezes_the_displacement():
     at = drawing()
     bench = pressing(at={at: lambda servo: bench.interruption.receive(signal.SIGINT)})

@@ -112,6 +112,7 @@ def test_a_signal_on_any_way_comes_to_rest_on_it_within_the_limits(plan, phase, 
     assert loop.log.columns()["phase"][-1] == "stop"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [0, 1])
 def test_a_signal_where_one_plan_ends_and_the_next_begins_stops_there(plan):
     for at in range(FIRSTS[plan + 1] - 2, FIRSTS[plan + 1] + 2):

@@ -174,6 +174,7 @@ def scattered(seed, n=3, loops=False):
     return result
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.permutations(range(4)))
 @settings(max_examples=6, deadline=None)
 def test_the_order_of_demonstrations_changes_nothing(seed, order):
@@ -185,6 +186,7 @@ def test_the_order_of_demonstrations_changes_nothing(seed, order):
     assert other.duration == pytest.approx(found.duration, abs=1e-12)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=5, deadline=None)
 def test_each_demonstration_twice_changes_nothing(seed):
@@ -249,6 +251,7 @@ def test_features_meet_where_one_loop_is_larger():
     assert length(found.mean) == pytest.approx(mean, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["Sine", "WShape", "heee", "Leaf_2"])
 def test_human_strokes_keep_their_length(shape):
     demonstrations = []

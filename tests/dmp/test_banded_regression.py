@@ -18,6 +18,7 @@ def setting(count, rule="spacing", alpha_1=1.0, samples=None, seed=0):
     return basis, phase(t, 2.5, alpha_1), forcing
 
 
+@pytest.mark.slow
 @given(
     count=st.integers(1, 120),
     rule=st.sampled_from(RULES),
@@ -34,6 +35,7 @@ def test_windows_hold_all_of_each_row_that_counts(count, rule, alpha_1, place):
     np.testing.assert_allclose(dense, basis.normalized(s), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("count", [2, 20, 150])
 def test_products_are_those_of_the_dense_matrix(rule, count):

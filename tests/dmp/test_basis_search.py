@@ -38,6 +38,7 @@ def test_a_simple_stroke_takes_as_many_as_the_paper():
         assert found.quality.excess(Tolerance(0.1)) <= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lwr", "ridge"])
 def test_more_loops_take_more_and_stay_within_the_tolerance(method):
     sizes = []
@@ -101,6 +102,7 @@ def test_judging_a_stroke_that_lost_its_waves():
     assert judged(there, flat, closed=False).wave == (pytest.approx(30.0, abs=0.01), 0.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(seed=st.integers(0, 1000))
 def test_nearest_is_the_distance_to_a_dense_path(seed):
@@ -114,6 +116,7 @@ def test_nearest_is_the_distance_to_a_dense_path(seed):
     np.testing.assert_allclose(nearest(points, path), cdist(points, dense).min(axis=1), atol=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lwr", "ridge"])
 def test_the_most_functions_stay_within_the_time_and_memory_of_their_samples(method):
     import tracemalloc

@@ -1,6 +1,7 @@
 """Lead and tilt: the axis is where its definition says, and the tool's own turn about it stays."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +26,7 @@ def still(position):
     return np.broadcast_to(DOWN, position.shape), np.eye(3)[None, None]
 
 
+@pytest.mark.slow
 @given(ANGLES, ANGLES, st.floats(-np.pi, np.pi))
 def test_on_a_line_lead_and_tilt_are_the_angles_of_a_protractor(lead, tilt, heading):
     c, s = np.cos(heading), np.sin(heading)

@@ -104,6 +104,7 @@ def test_it_begins_and_ends_at_the_demonstrated_velocity(
     assert velocity == pytest.approx(taught, abs=2e-6 * np.abs(taught).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["Snake", "WShape"])
 def test_strokes_that_people_stop_abruptly_end_at_their_velocity(shape):
     """By the samples themselves, whose last steps tell it roughly: by no swing of a spline."""
@@ -151,6 +152,7 @@ def test_moving_a_recording_with_its_tool_moves_the_drawn_stroke(name, regressio
     np.testing.assert_allclose(found, turned, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "wandering", "lifted"])
 def test_mirroring_a_recording_mirrors_the_drawn_stroke(name):
     here = STROKES[name]()

@@ -191,6 +191,7 @@ def test_a_turning_tool_is_reproduced_in_its_angles():
     assert np.abs(x[:, 3:] - signal.x[:, 3:]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_the_first_orientation_is_smoothed_too_where_the_recording_begins_before_it():
     stroke = paper_stroke()
     idle = 200

@@ -24,6 +24,7 @@ from tests.dmp.recordings import (
 SMOOTH = {"wave": six_seconds, "letters": letters, "corners": corners, "lift": pen_lift}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_white_noise_is_estimated_and_called_white(name, sigma):
@@ -115,6 +116,7 @@ def test_no_kind_of_noise_is_seen_where_there_is_none(name):
     assert found.typical < 0.01
 
 
+@pytest.mark.slow
 def test_no_kind_of_noise_is_seen_in_human_strokes():
     for shape in human_strokes.shapes():
         for stroke in human_strokes.strokes(shape)[::3]:

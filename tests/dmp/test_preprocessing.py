@@ -20,6 +20,7 @@ def height(result):
     return np.ptp(result.position(np.linspace(0.0, result.duration, 2001))[:, 1])
 
 
+@pytest.mark.slow
 def test_half_a_millimetre_of_noise_over_thirty_seeds():
     t, truth = six_seconds()
     dense = wave(np.linspace(0.0, 1.0, 4001))
@@ -59,6 +60,7 @@ def test_approach_and_retract_once_cut_leave_the_wave():
     assert np.abs(cut.position(np.linspace(0, cut.duration, 500))[:, 2]).max() < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.0, 0.01, 0.1])
 def test_a_pause_once_cut_leaves_the_wave(sigma):
     _, truth = six_seconds()

@@ -159,6 +159,7 @@ def strokes_without():
     yield "corners", *corners()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(strokes_without()), ids=lambda case: case[0])
 def test_no_approach_and_no_pause_where_there_is_none(case):
     _, t, points = case

@@ -79,6 +79,7 @@ def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
     assert np.quantile(ratios, 0.95) <= 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stroke", [corners, pen_lift])
 @pytest.mark.parametrize("sigma", [0.1, 0.5])
 def test_corners_and_lifts_stay_though_the_rest_is_smooth(stroke, sigma):
@@ -167,6 +168,7 @@ def test_a_sample_that_flies_off_does_not_spoil_the_rest():
     assert off[far].max() <= 0.2
 
 
+@pytest.mark.slow
 @given(angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3), seed=st.integers(0, 1000))
 @settings(max_examples=15)
 def test_a_recording_moved_and_rotated_is_smoothed_alike(angles, seed):

@@ -132,6 +132,7 @@ def test_the_plane_turns_with_stroke_and_tool(turn, share, closed):
     np.testing.assert_allclose(there.normals[0], R @ here.normals[0], atol=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(order=st.permutations(range(4)))
 def test_the_order_of_demonstrations_gives_the_same_normals(order):

@@ -63,6 +63,7 @@ def texts():
         yield "\n".join(found)
 
 
+@pytest.mark.slow
 def test_every_message_of_the_troubleshooting_page_is_one_of_the_program():
     whole = "\n".join(texts())
     page = (ROOT / "docs" / "troubleshooting.md").read_text().split("## The shell")[0]

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from typing import Any, TypeAlias
 from unittest import mock
 
@@ -15,11 +15,13 @@ from dmpcli.control.arrival import ArrivalMonitor
 from dmpcli.control.cycle import LoopOutcome
 from dmpcli.control.outputs import OutputSwitch
 from dmpcli.control.signals import Interruption
+from dmpcli.control.step_limits import StepLimits
 from dmpcli.errors import UnconfirmedStopError
 from dmpcli.instruments.elite.arm_driver import ArmDriver
 from dmpcli.instruments.elite.monitor import Monitor
 from dmpcli.instruments.elite.stream_driver import StreamDriver
 from dmpcli.instruments.netft import box_watch
+from dmpcli.planning import goal_course
 from dmpcli.workflows.run_output import RunOutput
 
 Plant: TypeAlias = Callable[[], AbstractContextManager[Any]]
@@ -35,6 +37,20 @@ def _jump() -> AbstractContextManager[Any]:
         return send(self, bent)
 
     return mock.patch.object(StreamDriver, "send", jumping)
+
+
+def _goal_jumps() -> AbstractContextManager[Any]:
+    """A goal is where the tool is at once, and nobody looks at the step to it."""
+    respond = goal_course.response
+
+    def at_once(filter_: Any, state: Any, shift: Any, count: int) -> Any:
+        return respond(filter_, np.stack([shift, np.zeros(3)]), shift, count)
+
+    stack = ExitStack()
+    stack.enter_context(mock.patch.object(goal_course, "response", at_once))
+    stack.enter_context(mock.patch.object(goal_course, "_by_limits", return_value=""))
+    stack.enter_context(mock.patch.object(StepLimits, "check", _nothing))
+    return stack
 
 
 def _lost() -> AbstractContextManager[Any]:
@@ -100,6 +116,7 @@ PLANTED: dict[str, tuple[Plant, str, tuple[str, ...]]] = {
         ("arm_stands",),
     ),
     "a set-point jumps": (_jump, "execute", ()),
+    "a goal that jumps is jumped to": (_goal_jumps, "execute moved", ()),
     "a change of the box's bias is believed": (
         lambda: mock.patch.object(box_watch, "changed", _nothing),
         "record",

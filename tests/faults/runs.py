@@ -4,7 +4,7 @@ import os
 import signal
 import tempfile
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from dmpcli.arrays import Floats
 from dmpcli.cli import app
 from dmpcli.control.signals import Interruption
+from dmpcli.instruments import goal_sources
 from dmpcli.kinematics import chain
 from dmpcli.kinematics.models import model
 from dmpcli.records import file_io, record, schemas, tool
@@ -39,6 +40,8 @@ COMMANDS = {
     "record": 0.25,
     "calibrate": 0.01,
 }
+MOVED = "execute moved"
+"""A third of what is executed: its goal jumps meanwhile, and garbage is sent beside it."""
 """What is run, and how often; a calibration takes as long as thirty strokes."""
 
 STROKES = {"stroke": (1.0, 41), "short": (0.12, 41), "long": (1.0, 201)}
@@ -118,9 +121,38 @@ def folder() -> Path:
         events = output_events.stored([OutputEvent(0.13 * t[-1], OUTPUT, on=True)], t)
         columns |= {schemas.EVENT: np.array(events, dtype=object)}
         facts = {"tau": float(t[-1]), "normal": [0.0, 0.0, 1.0]}
+        facts |= {"k": [100.0] * 6, "d": [20.0] * 6}
         drawn = Record(schemas.TRAJECTORY, columns, Provenance("generalize", {}, (), facts))
         (made / f"{name}.parquet").write_bytes(record.encode(drawn))
     return made
+
+
+def generator(seed: int) -> np.random.Generator:
+    """Return what everything of a seed is drawn from."""
+    return np.random.default_rng([seed, 0xFA])
+
+
+def draw(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
+    """Draw a seed's command, and none to three kinds of faults."""
+    command = str(rng.choice([*COMMANDS], p=[*COMMANDS.values()]))
+    # By numbers of its own, so that a seed draws what it always drew for the rest.
+    goals = np.random.default_rng([seed, 0x60])
+    command = MOVED if command == "execute" and goals.random() < 1 / 3 else command
+    count = int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1]))
+    return command, [str(kind) for kind in rng.choice(sorted(KINDS), count, replace=False)]
+
+
+def telling(seeds: Iterable[int]) -> list[int]:
+    """Return the seeds that put a kind of fault on a command for the first time."""
+    seen: set[tuple[str, str]] = set()
+    found = []
+    for seed in seeds:
+        command, kinds = draw(seed, generator(seed))
+        told = {(command, kind) for kind in kinds}
+        if not told <= seen:
+            seen |= told
+            found.append(seed)
+    return found
 
 
 def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = None) -> Finding:
@@ -133,14 +165,9 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
         Faults to put on; by the seed otherwise, none to three.
     command : str, optional
     """
-    rng = np.random.default_rng([seed, 0xFA])
-    drawn = str(rng.choice([*COMMANDS], p=[*COMMANDS.values()]))
+    rng = generator(seed)
+    drawn, chosen = draw(seed, rng)
     command = command or drawn
-    names = sorted(KINDS)
-    chosen = [
-        str(k)
-        for k in rng.choice(names, int(rng.choice(4, p=[0.05, 0.6, 0.25, 0.1])), replace=False)
-    ]
     chosen = chosen if kinds is None else [*kinds]
     stroke = "long" if command == "execute file" else str(rng.choice(["stroke", "short"]))
     wrong = Wrong()
@@ -160,6 +187,7 @@ def run(seed: int, kinds: tuple[str, ...] | None = None, command: str | None = N
             watched = f"dmpcli.{module}.watched"
             stack.enter_context(mock.patch(watched, lambda servo: servo))
         stack.enter_context(_signals(bench))
+        stack.enter_context(_goals(bench, np.random.default_rng([seed, 0x61])))
         result = CliRunner().invoke(app, _words(command, stroke, output))
         rest = _at_rest(bench) if not isinstance(result.exception, EndlessError) else True
     finding = Finding(
@@ -190,9 +218,40 @@ def _words(command: str, stroke: str, output: Path) -> list[str]:
         words += ["--allow-file-mode", "--ignore-events"]
     if command.endswith("felt"):
         words += felt
+    if command == MOVED:
+        words += ["--goal-from", "udp://:9870"]
     if command.endswith("pressed"):
         words += [*felt, "--coupling", "force", "--force-setpoint", "2"]
     return words
+
+
+@contextmanager
+def _goals(bench: Bench, rng: np.random.Generator) -> Iterator[None]:
+    """Somebody moves the goal by up to 15 mm, mostly in its plane; some datagrams are damaged."""
+    stroke = _plan("stroke")[-1]
+    letters: list[tuple[float, bytes]] = []
+    t = float(rng.uniform(0.0, 0.3))
+    for number in range(1, int(rng.integers(2, 30))):
+        way = rng.uniform(-1.0, 1.0, 3) * 10.0 ** rng.uniform(-1.0, 1.2)
+        way[2] *= rng.random() < 0.1
+        content = goal_sources.DATAGRAM.pack(b"DMPg", number, *(stroke + way))
+        how = rng.random()
+        if how < 0.1:
+            content = content[: int(rng.integers(40))]
+        elif how < 0.2:
+            content = rng.bytes(goal_sources.DATAGRAM.size)
+        elif how < 0.25:
+            content = goal_sources.DATAGRAM.pack(b"DMPg", number, np.nan, *stroke[1:])
+        letters += [(t, content)] * int(rng.choice([1, 1, 1, 2]))
+        t += float(rng.exponential(0.1))
+
+    def receive() -> goal_sources.Letter | None:
+        due = bench.entered and letters and bench.world.now() >= bench.entered + letters[0][0]
+        return (letters.pop(0)[1], ("127.0.0.1", 5000)) if due else None
+
+    made = goal_sources.DatagramGoals("udp", receive, 0.2)
+    with mock.patch.object(goal_sources, "datagrams", return_value=made):
+        yield
 
 
 @contextmanager
@@ -292,6 +351,12 @@ def _steps(finding: Finding, bench: Bench) -> Iterator[str]:
         if steps.max() > 0.02 * 250.0 * 1.01:
             yield f"a set-point steps by {steps.max():.2f} mm"
         return
+    if finding.command == MOVED:
+        # However the goal jumps, within the limits of `execute`.
+        bent = np.linalg.norm(np.diff(sent, 2, axis=0), axis=1).max(initial=0.0) / 0.02**2
+        if steps.max() > 0.02 * 250.0 * 1.01 or bent > 1.1 * 2250.0:
+            yield f"a set-point steps by {steps.max():.2f} mm, by {bent:.0f} mm/s²"
+        return
     plan = _plan(finding.stroke)
     # A soft start and the way back on the same path are slower than the plan.
     most = 1.02 * np.linalg.norm(np.diff(plan, axis=0), axis=1).max() + 0.01
@@ -338,7 +403,7 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
         yield "exit 0 without a file"
         return
     stop = bench.must_stop + (
-        [] if finding.command in ("execute", "execute file") else bench.must_stop_with_sensor
+        [] if finding.command in ("execute", MOVED, "execute file") else bench.must_stop_with_sensor
     )
     lasts = bench.ended - bench.entered if bench.ended else 0.0
     if any(after < lasts - 0.15 for after in stop):
@@ -351,8 +416,10 @@ def _done(finding: Finding, bench: Bench, output: Path, wrong: Wrong) -> Iterato
     kept = record.decode(file_io.read(str(output)), schemas.RUN)
     if not kept.provenance.facts["completed"]:
         yield "exit 0 of a run that says it is not complete"
-    at = bench.lab.controller.arm.posture.position
-    away = float(np.linalg.norm(at - _plan(finding.stroke)[-1]))
+    at, goal = bench.lab.controller.arm.posture.position, _plan(finding.stroke)[-1]
+    if finding.command == MOVED:
+        goal = np.array(kept.provenance.facts["goals"]["last"])
+    away = float(np.linalg.norm(at - goal))
     if finding.command != "execute pressed" and away > 1.0:
         yield f"exit 0, and the arm stands {away:.2f} mm from the goal"
     if finding.command != "execute file" and not bench.lab.controller.outputs:

@@ -1,8 +1,14 @@
 import pytest
 
+from tests.faults import world as simulated
+from tests.faults.faults import KINDS
 from tests.faults.planted import PLANTED
-from tests.faults.runs import run
+from tests.faults.runs import COMMANDS, MOVED, draw, generator, run, telling
 from tests.faults.world import World
+
+FEW = range(12)
+# Of many seeds those that put a kind of fault on a command for the first time.
+MORE = telling([*range(12, 40), *range(1000, 1160)])
 
 
 def told(finding):
@@ -17,17 +23,25 @@ def hold(seeds):
 
 
 def test_invariants_hold_whatever_fails():
-    hold(range(40))
+    hold(FEW)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(1000, 1160, 40))
-def test_invariants_hold_for_more_seeds(first):
-    hold(range(first, first + 40))
+@pytest.mark.parametrize("first", range(0, len(MORE), 30))
+def test_invariants_hold_for_every_kind_of_fault_on_many_a_command(first):
+    hold(MORE[first : first + 30])
+
+
+def test_these_seeds_put_on_every_kind_of_fault_and_run_every_command():
+    drawn = [draw(seed, generator(seed)) for seed in MORE]
+    assert {command for command, _ in drawn} == {MOVED, *COMMANDS}
+    assert {kind for _, kinds in drawn for kind in kinds} == set(KINDS)
+    assert len({(command, kind) for command, kinds in drawn for kind in kinds}) > 125
 
 
 def test_without_faults_every_command_is_done():
-    for command in ("execute", "execute felt", "execute pressed", "execute file", "record"):
+    commands = ("execute", MOVED, "execute felt", "execute pressed", "execute file", "record")
+    for command in commands:
         finding = run(7, (), command)
         assert (finding.code, finding.wrong) == (0, []), told(finding)
 
@@ -38,7 +52,9 @@ def test_a_seed_replays_its_run():
 
 
 @pytest.mark.parametrize("name", PLANTED)
-def test_a_planted_defect_is_found(name):
+def test_a_planted_defect_is_found(name, monkeypatch):
+    # One of them never ends; what is well ends within 4 s.
+    monkeypatch.setattr(simulated, "LONGEST", 20.0)
     plant, command, kinds = PLANTED[name]
     with plant():
         assert any(run(seed, kinds, command).wrong for seed in range(8)), name
@@ -56,6 +72,7 @@ def test_events_happen_in_order_and_sleepers_are_overtaken():
     assert (seen[-1], world.now()) == (("b", 2.0), 3.0)
 
 
+@pytest.mark.slow
 def test_a_bias_that_somebody_sets_moves_the_arm_no_further_than_15_mm_whatever_its_size():
     hold_all = [run(seed, ("sensor_biased",), "record") for seed in range(24)]
     assert not [told(finding) for finding in hold_all if finding.wrong]

@@ -44,6 +44,7 @@ def groups(text, pattern):
                      re.findall(pattern, text)])  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("thin", [0.0, 0.005])
 def test_a_program_comes_back_within_a_hundredth_of_mm_and_degree(language, thin):
@@ -85,6 +86,7 @@ SWITCHED = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("lines", [1000, 12])
 def test_outputs_come_back_at_their_places(language, lines):
@@ -117,6 +119,7 @@ WORDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_outputs_are_in_the_words_of_each_language(language):
     text = program(language, None, replace(wave(), events=SWITCHED))
@@ -195,6 +198,7 @@ def test_krl_survives_its_singular_orientation(level):
     )
 
 
+@pytest.mark.slow
 def test_tool_data_stand_in_the_program():
     options = ProgramOptions(tool=TOOL, payload=True)
     # The centre of mass in flange axes: 10 mm along the sensor's x, which is the flange's y.
@@ -236,6 +240,7 @@ def test_a_stroke_without_orientation_is_refused_with_the_option(language):
         program(language, None, bare)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("language", "line", "words"),
     [
@@ -271,6 +276,7 @@ def test_numbers_that_are_no_quantities_are_refused_before_anything_overflows(
         read(language, text)
 
 
+@pytest.mark.slow
 @given(st.integers(3, 60), st.floats(0.001, 1.0), st.integers(0, 2**32 - 1))
 def test_thinning_leaves_nothing_further_off_than_its_tolerance(samples, tolerance, seed):
     rng = np.random.default_rng(seed)

@@ -36,6 +36,7 @@ def same(read, one):
     assert angle_between(read.rotation, one.rotation).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_mcap_comes_back_to_1e_9_with_its_wrench():
     one = felt()
     back, told = read(mcap_file.encode(motion(one)))
@@ -44,6 +45,7 @@ def test_mcap_comes_back_to_1e_9_with_its_wrench():
     assert told == ["poses of '/pose' in frame 'base', m", "wrench of '/wrench'"]
 
 
+@pytest.mark.slow
 def test_a_bag_comes_back_to_1e_9_with_its_wrench(tmp_path):
     one = felt()
     ros_bag.write(motion(one), tmp_path / "bag")
@@ -160,6 +162,7 @@ def bag_of_others(folder, rows, frame="map", plugin="SQLITE3"):
                 writer.write(known[topic], stamp, content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
 def test_odometry_and_tf_of_others_are_read(tmp_path, plugin):
     one = wave(samples=50)

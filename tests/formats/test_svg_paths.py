@@ -64,6 +64,7 @@ def test_a_circle_stays_within_the_tolerance_and_has_its_length(tolerance):
     np.testing.assert_allclose(length, 40 * np.pi, rtol=tolerance / 10)
 
 
+@pytest.mark.slow
 def test_a_bezier_lies_on_its_polynomial():
     stroke, _ = drawn('<path d="M 0 0 C 0 80, 200 80, 200 0"/>', tolerance=0.001, speed=10.0)
     u = np.linspace(0, 1, 4001)[:, None]

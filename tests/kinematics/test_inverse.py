@@ -36,6 +36,7 @@ def searched(position, rotation, starts=24):
     return min(np.sqrt(2 * fit.cost) for fit in found)
 
 
+@pytest.mark.slow
 def test_every_solution_of_ten_thousand_poses_leads_back_to_its_pose():
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (10_000, 6))
     position, rotation = chain.forward(EC66, q)

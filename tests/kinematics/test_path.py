@@ -224,6 +224,7 @@ def test_a_path_of_one_sample_has_no_speed():
     assert found.speed.sample == 0
 
 
+@pytest.mark.slow
 def test_the_whole_path_is_what_the_loops_solver_finds_sample_by_sample():
     rng = np.random.default_rng(12)
     compared = 0

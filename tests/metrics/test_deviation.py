@@ -62,6 +62,7 @@ def test_same_shape_late_along_it_deviates_in_phase_but_not_in_shape(count):
     assert got.phase_rms == pytest.approx(np.full(count, 100 / np.sqrt(30)), rel=1e-2)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.2, 5.0))
 def test_many_strokes_together_are_as_far_as_each_from_every_segment(seed, corners, stretch):
     rng = np.random.default_rng(seed)
@@ -108,6 +109,7 @@ def curve(kind, m=300):
             return np.column_stack([60 * np.sin(a / 2), 1e-3 * a, 0 * a])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["eight", "spiral", "and back"])
 @pytest.mark.parametrize("late", [0.0, 0.15])
 def test_the_nearest_place_is_found_however_far_along_the_demonstration_it_is(kind, late):

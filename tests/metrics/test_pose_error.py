@@ -47,6 +47,7 @@ def test_a_turn_of_the_tool_alone_is_an_error_of_rotation_alone():
     assert errors.rotation == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6), st.floats(0.5, 2.0))
 def test_alignment_finds_the_motion_and_the_scale_that_were_applied(six, scale):
     here = curve().position

@@ -95,6 +95,7 @@ signals = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(signals)
 def test_extrema_are_those_of_scipys_prominence(values):
     v = np.array(values)

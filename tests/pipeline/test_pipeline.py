@@ -33,6 +33,7 @@ def shell(command, folder):
     )
 
 
+@pytest.mark.slow
 def test_record_to_report(dmpcli, tmp_path):
     dmpcli("record", "-o", "demo.parquet", "--seed", "1")
     dmpcli("fit", "demo.parquet", "-o", "skill.json")

@@ -264,6 +264,7 @@ def test_the_header_holds_no_place_and_no_time(tmp_path):
     assert str(tmp_path).encode() not in content
 
 
+@pytest.mark.slow
 def test_it_is_written_without_pandas():
     code = (
         "import sys, pathlib, tempfile;"

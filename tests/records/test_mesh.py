@@ -415,6 +415,7 @@ f -4 -1 3
     assert area(found.V, found.F) == pytest.approx(1.5)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.permutations(range(20)), st.integers(0, 1000))
 def test_the_order_of_vertices_and_faces_does_not_change_the_surface(order, seed):

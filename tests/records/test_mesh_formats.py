@@ -259,6 +259,7 @@ def test_a_polygon_that_crosses_itself_is_told_by_its_number():
     ]
 
 
+@pytest.mark.slow
 def test_more_faces_than_memory_serves_are_refused():
     head = bytes(80) + struct.pack("<I", 10_000_000)
     # A file of that length, of which nothing is looked at.
@@ -283,6 +284,7 @@ def test_area_and_volume_are_those_of_the_solid():
 numbers = st.lists(st.lists(st.integers(0, 9), min_size=3, max_size=9), min_size=1, max_size=6)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(numbers, st.sampled_from(FORMS))
 def test_ply_obj_and_off_hold_the_same_triangles(faces, form):

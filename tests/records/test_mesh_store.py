@@ -43,6 +43,7 @@ def same(one, other):
     same_bits(mesh.topology.border, kept.topology.border)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", [None, POSE])
 @pytest.mark.parametrize("noise", [0.0, 0.3])
 @pytest.mark.parametrize("unit", [None, "cm"])

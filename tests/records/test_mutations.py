@@ -132,6 +132,7 @@ def spin():
         json.dumps({})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deed", "limit"), [(block, "STILL"), (spin, "DEAF")])
 def test_a_process_that_hears_no_alarm_is_ended(monkeypatch, deed, limit):
     monkeypatch.setattr(worker, limit, 0.5)

@@ -57,6 +57,7 @@ def same(path, rows):
             row += 1
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(count=st.integers(1, 12), rows=st.integers(1, 5), data=st.data())
 def test_pieces_are_the_table_whatever_stands_between_its_rows(tmp_path_factory, count, rows, data):

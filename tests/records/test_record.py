@@ -35,6 +35,7 @@ def with_header(columns, **header):
     return table.replace_schema_metadata({"dmpcli": json.dumps(base | header)})
 
 
+@pytest.mark.slow
 @given(st.lists(st.none() | st.text()))
 def test_texts_round_trip_whatever_their_letters(values):
     column = record._arrow(values, pa.string())
@@ -42,6 +43,7 @@ def test_texts_round_trip_whatever_their_letters(values):
     assert column.to_pylist() == values
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-LARGEST, LARGEST), min_size=1, max_size=30))
 def test_floats_round_trip_exactly(values):
     x = np.array(values)
@@ -72,6 +74,7 @@ def test_every_field_carries_its_unit():
         assert all(column.unit for column in kind.columns.values())
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.text(max_size=4), st.integers(0, 3)), min_size=1, max_size=20))
 def test_repeated_texts_are_those_of_a_plain_loop(words):
     texts, counts = zip(*words, strict=True)
@@ -102,6 +105,7 @@ def test_a_truncated_file_is_named(keep):
         record.decode(Source("cut.parquet", content[: int(keep * len(content))]))
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.integers(1, 255))
 def test_a_flipped_byte_never_ends_in_a_traceback(position, flip):
     content = bytearray(record.encode(demonstration()))

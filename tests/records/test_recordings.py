@@ -200,6 +200,7 @@ def test_decimal_commas_are_read_as_points_are(rows, data):
     assert points.remarks == ()
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.lists(numbers, min_size=3, max_size=3), min_size=2, max_size=9),
     st.sampled_from([",", ";", "\t", " "]),

@@ -19,6 +19,7 @@ def plainly(text):
     return [line for _, line in kept], [i for i, _ in kept]
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @example("a\n\n")
 @example("a\n# b")

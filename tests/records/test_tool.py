@@ -32,6 +32,7 @@ def changed(**parts):
     return Source("pen.json", json.dumps(document).encode())
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.booleans())
 def test_a_tool_survives_its_file(seed, zeroed):
     rng = np.random.default_rng(seed)

@@ -97,6 +97,7 @@ def test_what_cannot_be_drawn_is_refused_with_its_row(case):
     assert message in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BAD)
 @pytest.mark.parametrize(
     "words", [["execute", "--dry-run"], ["report"], ["inspect"]], ids=lambda words: words[0]

@@ -88,6 +88,7 @@ def test_a_defect_outside_of_a_reader_keeps_its_traceback_and_exit_code_1(
         assert "a.parquet: cannot be read (ZeroDivisionError" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_small_file_that_would_fill_the_memory_is_refused_before_it_does():
     rows = 20_000_000
     zeros = pa.Array.from_buffers(pa.float64(), rows, [None, pa.py_buffer(bytes(8 * rows))])
@@ -110,6 +111,7 @@ def test_a_dictionary_cannot_blow_its_text_up():
         tables.read(Source("a.parquet", content))
 
 
+@pytest.mark.slow
 def test_a_table_of_many_columns_is_refused_at_once():
     header = ",".join(f"c{i}" for i in range(100_000))
     begin = time.monotonic()

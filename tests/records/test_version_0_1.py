@@ -100,6 +100,7 @@ def test_a_tool_and_its_poses_are_used(tmp_path):
     assert new["payload"]["weight"] == pytest.approx(old["payload"]["weight"], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_every_key_of_the_old_settings_is_known(tmp_path):
     said = ["--config", KEPT / "settings.toml", "-q"]
     demo, skill, drawn = (tmp_path / name for name in ("d.parquet", "s.json", "t.parquet"))

@@ -85,6 +85,7 @@ def column(table, name):
     return table[:, FIGURES.index(name)]
 
 
+@pytest.mark.slow
 def test_waves_of_any_height_noise_and_direction(tmp_path):
     folder = put_batch(tmp_path / "b", [strokes(20), strokes(25, seed=4)])
     table = alike(folder, taught())
@@ -178,6 +179,7 @@ def test_the_original_model_with_its_far_points(tmp_path):
     alike(folder, taught())
 
 
+@pytest.mark.slow
 def test_parts_larger_than_a_row_group_are_read_in_pieces(tmp_path):
     whole = put_batch(tmp_path / "a", [strokes(12)])
     cut = put_batch(tmp_path / "b", [strokes(12)], row_group=700)

@@ -33,6 +33,7 @@ def test_a_home_that_can_be_written_is_left_to_matplotlib(tmp_path):
 
 
 # A file where the home should be, and no folder at all: both stop root, too.
+@pytest.mark.slow
 @pytest.mark.parametrize("home", ["file", pytest.param("/dev/null/home", marks=pytest.mark.slow)])
 def test_a_home_that_cannot_be_written_has_one_folder_for_each_user_instead(tmp_path, ours, home):
     (tmp_path / "file").touch()

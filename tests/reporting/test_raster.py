@@ -25,20 +25,18 @@ def along_rays(corners, view):
     """Depth at each pixel by intersecting its ray with every triangle (Möller and Trumbore)."""
     h, w = view.shape
     best = np.full((h, w), -np.inf)
-    for row in range(h):
-        for column in range(w):
-            at = view.low + (np.array([column, row]) + 0.5) / view.scale
-            origin = at[0] * view.right + at[1] * view.up
-            for a, b, c in corners:
-                p = np.cross(view.toward, c - a)
-                size = (b - a) @ p
-                if abs(size) < 1e-12:
-                    continue
-                s = origin - a
-                q = np.cross(s, b - a)
-                u, v = s @ p / size, view.toward @ q / size
-                if u >= 0.0 and v >= 0.0 and u + v <= 1.0:
-                    best[row, column] = max(best[row, column], (c - a) @ q / size)
+    a, b, c = (corners[:, k] for k in range(3))
+    p = np.cross(view.toward, c - a)
+    size = np.sum((b - a) * p, axis=1)
+    for row, column in np.ndindex(h, w):
+        at = view.low + (np.array([column, row]) + 0.5) / view.scale
+        s = at[0] * view.right + at[1] * view.up - a
+        q = np.cross(s, b - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v = np.sum(s * p, axis=1) / size, q @ view.toward / size
+            depth = np.sum((c - a) * q, axis=1) / size
+        met = (np.abs(size) >= 1e-12) & (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
+        best[row, column] = depth[met].max(initial=-np.inf)
     return best
 
 

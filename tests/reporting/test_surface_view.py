@@ -78,6 +78,7 @@ def test_a_stroke_on_the_mesh_is_measured_along_it(ground):
     assert lies["remark"] is None
 
 
+@pytest.mark.slow
 def test_the_originals_failure_stands_beside_it(ground):
     stroke = original()
     # Closed form: a stroke in the plane of its two ends, against the circle below it.
@@ -104,6 +105,7 @@ def test_the_demonstrations_own_height_is_taken_off(ground):
     assert beside.distance.max() < 0.03
 
 
+@pytest.mark.slow
 def test_a_run_of_a_curved_stroke_is_measured_along_the_surface(ground):
     path, normal = fillet_wave(50.0)
     (drawn,) = strokes_of(run(curved_trajectory(path, normal)), "run")
@@ -212,6 +214,7 @@ def test_a_demonstration_far_away_is_left_out(strokes, ground):
     assert not any("demonstration" in name for name in names[1])
 
 
+@pytest.mark.slow
 def test_what_is_drawn_of_a_mesh_ends_at_the_box_and_is_coarse_enough():
     V, F = fillet_mesh(step=0.05)
     fine = ReportSurface("fine.stl", Mesh(V, F), V, F)

@@ -186,6 +186,7 @@ def test_a_wrong_choice_names_the_choices_and_a_wrong_number_its_range():
         resolve(FitSettings, {"start": -1.0})
 
 
+@pytest.mark.slow
 @given(st.floats(3.0, 89.0))
 def test_an_angle_given_in_degrees_is_kept_in_radians(degrees):
     tilt = next(one for one in settings_of(CalibrateSettings) if one.name == "tilt")

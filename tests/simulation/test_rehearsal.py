@@ -89,6 +89,7 @@ def test_the_duration_holds_the_stroke_and_its_rests():
     assert np.linalg.norm(p[-1] - GOAL) < 0.5
 
 
+@pytest.mark.slow
 def test_until_rest_ends_after_the_stroke():
     _, recorder, ending = rehearse(until_rest=0.8)
     _, p = positions(recorder)
@@ -174,6 +175,7 @@ def test_a_much_lighter_damping_along_the_normal_hammers_on_the_plate_until_it_i
     assert np.ptp(pressed(damping=light)[-100:]) < 0.1
 
 
+@pytest.mark.slow
 def test_a_tool_let_go_stays_where_it_is_in_spite_of_noise_and_drift():
     clock = SimulatedClock()
     lab = Lab(clock, Scene(position=np.zeros(3)))

@@ -61,6 +61,7 @@ def test_an_event_that_is_given_twice_is_refused():
 EVENT = st.builds(OutputEvent, st.floats(0.0, 2.0), st.sampled_from(["DO1", "TO0"]), st.booleans())
 
 
+@pytest.mark.slow
 @given(st.lists(EVENT, max_size=8))
 def test_a_column_holds_them_to_a_nanosecond(events):
     events = sorted(events, key=lambda event: event.t)

@@ -24,6 +24,20 @@ def test_to_euler_inverts_from_euler(angles):
     np.testing.assert_allclose(rotations.from_euler(rotations.to_euler(R)), R, atol=1e-12)
 
 
+@given(st.tuples(angle, st.floats(-1.57, 1.57), angle))
+def test_one_rotation_has_the_angles_that_it_has_among_others(angles):
+    R = rotations.from_euler(np.array(angles))
+    np.testing.assert_allclose(rotations.to_euler_one(R), rotations.to_euler(R), atol=1e-13)
+
+
+@pytest.mark.parametrize("rx", [np.pi, -np.pi, 0.3])
+@pytest.mark.parametrize("ry", [np.pi / 2, -np.pi / 2, 0.0])
+def test_so_it_has_at_the_singularity_and_where_a_pen_points_down(rx, ry):
+    for noise in (1e-16, -1e-16, 0.0):
+        R = rotations.from_euler(np.array([rx + noise, ry, -0.8]))
+        np.testing.assert_allclose(rotations.to_euler_one(R), rotations.to_euler(R), atol=1e-13)
+
+
 @pytest.mark.parametrize("ry", [np.pi / 2, -np.pi / 2])
 def test_to_euler_gives_the_same_rotation_at_the_singularity(ry):
     R = rotations.from_euler(np.array([0.3, ry, -0.8]))

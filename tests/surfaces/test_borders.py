@@ -201,6 +201,7 @@ def test_no_pairs_are_no_trouble():
     assert mesh.charts(none, none).lift(np.empty((0, 20, 3))).position.shape == (0, 20, 3)
 
 
+@pytest.mark.slow
 def test_a_step_in_the_surface_is_named():
     V, F = fields.grid(
         lambda x, y: np.stack([x, y, np.where(x > 0.5, -1.5, 0.0)], -1),

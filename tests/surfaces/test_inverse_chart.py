@@ -139,6 +139,7 @@ def test_a_stroke_does_not_depend_on_those_beside_it(meshes, name):
         np.testing.assert_array_equal(alone.coordinates[0], together.coordinates[i])
 
 
+@pytest.mark.slow
 def test_samples_beyond_the_border_are_told_and_spoil_no_other(meshes):
     charts = laid(meshes["bumpy"])
     wanted = swung(charts)

@@ -29,6 +29,7 @@ def brute_force_distance(mesh, points, samples=60):
     return np.array([np.linalg.norm(cloud - p, axis=1).min() for p in points])
 
 
+@pytest.mark.slow
 def test_closest_points_are_those_of_a_dense_cloud():
     mesh = Mesh(*fields.square(fields.bumpy(), 200, reach=20.0))
     points = np.random.default_rng(0).normal(size=(30, 3)) * 15
@@ -60,6 +61,7 @@ def test_normals_are_not_smoothed_across_creases():
     np.testing.assert_allclose(hits.normal[2], [np.sin(np.pi / 3), 0, 0.5], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_chordal_estimate_bounds_the_distance_to_the_true_surface():
     for field in (fields.saddle(), fields.bumpy()):
         for faces in (2_000, 20_000):

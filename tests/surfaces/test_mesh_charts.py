@@ -58,6 +58,7 @@ def test_w_stands_off_the_mesh_along_the_normal(name):
     )
 
 
+@pytest.mark.slow
 def test_a_rigid_motion_moves_everything_alike():
     mesh, case = cases.mesh("bumpy", 5_000), cases.case("bumpy", 16, 200)
     _, lift = cases.drawn(mesh, case)
@@ -204,6 +205,7 @@ def test_fillets_of_long_slivers_stay_within_their_chordal_tolerance(radius):
     assert np.linalg.norm(lift.position[:, -1] - charts.target, axis=1).max() <= 0.01
 
 
+@pytest.mark.slow
 def test_slivers_beside_a_hole_are_drawn_as_without_it():
     # Lines straight across the facets stop at the hole; the strip is carried over it.
     (V, F), rolled = fillet(60.0, (-120.0, 10.0, 16.0, 120.0))

@@ -34,6 +34,7 @@ def share(mesh, faces):
     return area[mesh.noise[faces] > 0.0].sum() / area.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("faces", [5_000, 50_000])
 def test_smooth_surfaces_are_not_noisy_anywhere(name, faces):

@@ -28,6 +28,7 @@ def random_plane(seed):
     return R[:, 2], R[:, 0]
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_stroke_axes_find_the_plane_of_a_wave_and_point_to_the_tool(seed):
     normal, along = random_plane(seed)
@@ -95,6 +96,7 @@ def test_open_axes_are_the_closest_to_parallel_of_all_planes_through_the_line():
         assert turned @ normal <= best + 1e-12
 
 
+@pytest.mark.slow
 @given(point, point, st.integers(0, 10_000))
 def test_charts_hit_both_ends_and_invert(start, goal, seed):
     if np.linalg.norm(goal - start) < 1.0:

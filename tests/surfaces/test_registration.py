@@ -173,6 +173,7 @@ def test_a_box_touched_on_one_face_only_is_refused():
         laid(points, V, F, np.eye(3), np.zeros(3))
 
 
+@pytest.mark.slow
 def test_motions_are_named_in_the_base_frame():
     rng = np.random.default_rng(10)
     V, F = tube()
@@ -230,6 +231,7 @@ def test_a_box_in_all_orientations_has_a_rival_that_looks_the_same():
     assert near_it.rival is None or not near_it.rival.near
 
 
+@pytest.mark.slow
 def test_directions_of_approach_tell_sides_of_a_thin_plate_apart():
     """A plate of 3 mm touched on top and along its upper edge: it may also lie 3 mm higher."""
     rng = np.random.default_rng(12)

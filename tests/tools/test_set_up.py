@@ -78,9 +78,13 @@ def place(tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A place with an environment: each takes seconds to make."""
-    place = Place(tmp_path_factory.mktemp("whole"))
-    assert "into .venv" in place.done()
+    """A place with an environment: each takes seconds to make, so it is a difficult one at once."""
+    folder = tmp_path_factory.mktemp("whole") / "Größe und Platz" / ("lang " * 40).strip()
+    folder.mkdir(parents=True)
+    place = Place(folder)
+    shell = {"LC_ALL": "C", "LANG": "C", "HOME": "/dev/null/home"}
+    elsewhere = str(folder / "elsewhere")
+    assert "into .venv" in place.done(**shell, PIP_USER="1", PIP_TARGET=elsewhere)
     return place
 
 
@@ -199,14 +203,9 @@ def test_what_an_interrupted_one_left_is_made_whole_once_also_by_two_at_once(pla
 
 
 @pytest.mark.slow
-def test_a_difficult_place_and_what_a_shell_says_to_pip_do_no_harm(tmp_path):
-    folder = tmp_path / "Größe und Platz" / ("lang " * 40).strip()
-    folder.mkdir(parents=True)
-    place = Place(folder)
-    elsewhere = str(folder / "elsewhere")
-    place.done(LC_ALL="C", LANG="C", HOME="/dev/null/home", PIP_USER="1", PIP_TARGET=elsewhere)
-    assert not Path(elsewhere).exists()
-    pip = subprocess.run([folder / ".venv/bin/pip", "--version"], capture_output=True, check=True)
+def test_a_difficult_place_and_what_a_shell_says_to_pip_do_no_harm(whole):
+    assert not (whole.folder / "elsewhere").exists()
+    pip = subprocess.run([whole.venv / "bin/pip", "--version"], capture_output=True, check=True)
     assert b"pip" in pip.stdout
 
 

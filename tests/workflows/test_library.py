@@ -28,6 +28,7 @@ def skill():
     return dmpcli.fit(dmpcli.read(RECORDED), regression="ridge")
 
 
+@pytest.mark.slow
 def test_the_page_of_the_api_runs_as_it_is_printed(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "api.md").read_text(), re.S)
@@ -63,6 +64,7 @@ def test_a_skill_has_the_bytes_that_fit_writes(tmp_path, skill):
     np.testing.assert_array_equal(again.weights, skill.weights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [None, BENCH], ids=["plane", "bench"])
 def test_a_trajectory_has_the_bytes_that_generalize_writes(tmp_path, skill, surface):
     ends = (START, GOAL)

@@ -47,6 +47,7 @@ def drawn(skill):
     return dmpcli.generalize(skill, START, GOAL, **EASED)
 
 
+@pytest.mark.slow
 def test_a_recording_has_the_bytes_that_record_writes(tmp_path, taught):
     done("record", "-o", tmp_path / "a.parquet", "--duration", "3", "--seed", "7")
     dmpcli.write(taught, tmp_path / "b.parquet")
@@ -81,6 +82,7 @@ def test_a_run_has_the_bytes_that_execute_writes(tmp_path, drawn, words, said):
     np.testing.assert_array_equal(read.position, run.position)
 
 
+@pytest.mark.slow
 def test_a_batch_is_executed_and_reported_as_its_folder(tmp_path, skill):
     many = dmpcli.generalize(skill, [START, START, START], [GOAL, GOAL, START], **EASED)
     dmpcli.write(many, tmp_path / "batch")
@@ -101,6 +103,7 @@ def test_a_dry_run_moves_nothing_and_returns_plans_with_their_checks(drawn, monk
         dmpcli.execute(drawn, dry_run=True, max_speed=5.0)
 
 
+@pytest.mark.slow
 def test_what_execute_and_record_refuse_raises_the_same_text(tmp_path, drawn):
     path = tmp_path / "t.parquet"
     dmpcli.write(drawn, path)
@@ -178,6 +181,7 @@ def test_beside_the_main_thread_only_simulated_time_runs(drawn):
     assert "main thread" in ended["real"]
 
 
+@pytest.mark.slow
 def test_a_report_has_the_values_and_files_that_report_writes(tmp_path, skill, drawn):
     dmpcli.write(skill, tmp_path / "skill.json")
     dmpcli.write(drawn, tmp_path / "drawn.parquet")

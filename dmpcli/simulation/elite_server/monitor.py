@@ -1,12 +1,13 @@
 """The 1024 bytes that the simulated EC66 sends every 8 ms, big-endian."""
 
+import math
 import struct
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.simulation.elite_server.controller import SimulatedController
-from dmpcli.simulation.elite_server.parameters import pose_row
+from dmpcli.simulation.elite_server.parameters import pose_numbers
 
 PERIOD = 0.008
 """s between frames."""
@@ -28,6 +29,9 @@ _FRAME = struct.Struct(
 )
 
 
+_ZEROS = (0.0,) * 8
+
+
 def frame(controller: SimulatedController, milliseconds: int) -> bytes:
     """Return one frame.
 
@@ -42,9 +46,8 @@ def frame(controller: SimulatedController, milliseconds: int) -> bytes:
     """
     arm, euler = controller.arm, controller.habits.euler
     at = arm.posture
-    positions = np.array([at.position, at.flange_position])
-    rotations = np.array([at.rotation, at.flange_rotation])
-    tip, flange = pose_row(positions, rotations, euler).tolist()
+    tip = pose_numbers(at.position, at.rotation, euler)
+    flange = pose_numbers(at.flange_position, at.flange_rotation, euler)
     return _FRAME.pack(
         SIZE,
         milliseconds,
@@ -52,7 +55,7 @@ def frame(controller: SimulatedController, milliseconds: int) -> bytes:
         *_eight(np.degrees(arm.joints)),
         *tip,
         *tip,
-        *_eight(np.zeros(6)),
+        *_ZEROS,
         controller.state,
         controller.servo,
         controller.synced,
@@ -65,10 +68,10 @@ def frame(controller: SimulatedController, milliseconds: int) -> bytes:
         *flange,
         *flange,
         controller.estop_since is not None,
-        float(np.linalg.norm(at.velocity[:3])),
+        math.hypot(*at.velocity[:3].tolist()),
         *_eight(np.degrees(arm.speeds)),
         0.0,
-        *_eight(np.zeros(6)),
+        *_ZEROS,
         *([0.0] * 24),
         0,
         MATCHING_WORD,

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.spatial.rotations import from_euler, to_euler
+from dmpcli.spatial.rotations import from_euler, to_euler, to_euler_one
 
 Euler = Literal["xyz", "zyx"]
 """Which rx, ry, rz a controller means: R = Rx(rx) Ry(ry) Rz(rz), or R = Rz(rz) Ry(ry) Rx(rx)."""
@@ -117,3 +117,10 @@ def pose_row(position: Floats, rotation: Floats, euler: Euler, degrees: bool = F
     """Each pose as six numbers: mm, and rad or degrees; shape (..., 6)."""
     turned = angles(rotation, euler)
     return np.concatenate([position, np.degrees(turned) if degrees else turned], axis=-1)
+
+
+def pose_numbers(position: Floats, rotation: Floats, euler: Euler) -> list[float]:
+    """`pose_row` of one pose in mm and rad, in plain floats: for what is sent every 8 ms."""
+    if euler == "xyz":
+        return [*position.tolist(), *to_euler_one(rotation)]
+    return [*position.tolist(), *(-angle for angle in to_euler_one(rotation.T))]

@@ -74,8 +74,9 @@ class VisitingHand:
             return
         if self._spot is None or float(np.abs(arm.joints - self._spot).max()) > _STILL:
             self._spot, self._since = arm.joints, t
-        near = float(np.linalg.norm(arm.posture.position - self._start)) <= REACH
-        if near and t - self._since >= PATIENCE:
+        if t - self._since < PATIENCE:
+            return
+        if float(np.linalg.norm(arm.posture.position - self._start)) <= REACH:
             self.gripping, self._began = True, t
             self._tutor.begin(t)
 

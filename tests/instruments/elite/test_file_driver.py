@@ -41,6 +41,7 @@ def test_a_plan_is_sent_with_time_stamps_from_zero_and_checked_before_it_may_run
     assert robot.asked[-1] == ("start_trajectory", {"speed_percent": 100})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("answers", "error", "words"),
     [

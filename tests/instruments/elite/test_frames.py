@@ -25,6 +25,7 @@ def test_the_layout_is_that_of_the_document():
     assert {name: FRAME.fields[name][1] for name in document} == document
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(-720, 720), min_size=6, max_size=6),
     st.integers(0, 2**64 - 1),

@@ -133,6 +133,7 @@ def test_any_bytes_are_a_page_or_a_named_error(content):
         read_pages(content)
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(sorted(FIELDS)), st.text("0123456789.;-eNxm ", max_size=8)))
 def test_any_values_are_a_box_or_a_named_error(changes):
     try:

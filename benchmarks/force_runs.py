@@ -1,0 +1,268 @@
+"""How `benchmarks.force` draws one row once, and what it measures by what truly happened."""
+
+import contextlib
+import io
+import logging
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.spatial import cKDTree
+
+import dmpcli
+from benchmarks.force_cases import (
+    FORCE,
+    GOAL,
+    LAG,
+    MIDDLE,
+    PEN,
+    PERIOD,
+    RADIUS,
+    ROOT,
+    START,
+    TOOL,
+    UP,
+    Case,
+    said_of,
+)
+from dmpcli.arrays import AnyArray, Floats
+from dmpcli.bench import options
+from dmpcli.bench.workpiece import Flat, Round
+from dmpcli.bench.world import World
+from dmpcli.control.execution import SENSOR_RATE
+from dmpcli.dmp import reference_paths
+from dmpcli.errors import DmpError
+from dmpcli.metrics.wave_height import stroke_wave
+from dmpcli.records import file_io, record, schemas
+from dmpcli.spatial.pose import Pose
+
+
+def pressed_skill() -> dmpcli.Skill:
+    """Return the paper's stroke as taught on a plane in contact, from 3 to 8 to 4 N."""
+    t = np.linspace(0.0, 10.0, 1001)
+    rng = np.random.default_rng(1)
+    force = 0.05 * rng.standard_normal((len(t), 6))
+    push = 3.0 + t / 10.0 + 4.5 * np.sin(np.pi * t / 10.0) ** 2
+    force[:, 2] += push
+    position = reference_paths.sine(START, GOAL, 50.0, t, 10.0) - push[:, None] / PEN * UP
+    angles = np.tile([np.pi, 0.0, 0.0], (len(t), 1))
+    names = ["t", "x", "y", "z", "rx", "ry", "rz"]
+    names += [f"{name} [N]" for name in schemas.FORCE]
+    names += [f"{name} [N·m]" for name in schemas.WRENCH[3:]]
+    table = np.column_stack([t, position, angles, force])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pressed.parquet"
+        pq.write_table(pa.table(dict(zip(names, table.T, strict=True))), path)
+        return dmpcli.fit(dmpcli.read(path), normal=(0.0, 0.0, 1.0), force_profile=True)
+
+
+@lru_cache
+def planned(
+    plan: str, offset: float, taught: bool = False, brief: bool = False
+) -> dmpcli.Trajectory:
+    """Return the stroke on the surface that the plan knows, so far off it, mm."""
+    if taught:
+        skill = pressed_skill()
+    else:
+        skill = dmpcli.fit(dmpcli.read(ROOT / "sample_runs" / "reference.parquet"))
+    shapes = {
+        "plane": dmpcli.Plane(MIDDLE, UP),
+        # Along its highest line, so that the wave swings to both sides.
+        "cylinder": dmpcli.Cylinder(MIDDLE - RADIUS * UP, np.array([1.0, 0.0, 0.0]), RADIUS),
+    }
+    drawn = dmpcli.generalize(
+        skill,
+        START,
+        START + (0.1 if brief else 1.0) * (GOAL - START),
+        shapes[plan],
+        orientation="surface",
+        duration=4.0 if brief else 10.0,
+        ease_in=1.0 if brief else 2.0,
+        ease_out=1.0 if brief else 2.0,
+        offset=offset,
+    )
+    assert isinstance(drawn, dmpcli.Trajectory)
+    return drawn
+
+
+def run(case: Case, seed: int) -> dict[str, Any]:
+    """Draw one case with one seed; return what was measured, or why it was not drawn."""
+    logging.disable(logging.CRITICAL)
+    said = said_of(case, seed)
+    pen = float(said.get("stiffness", PEN))
+    drawn = planned(case.plan, 0.0 if case.coupled else -FORCE / pen, case.taught, case.brief)
+    sensor = {"sensor": f"bench://{case.arm}", "coupling": "force"}
+    if not case.taught:
+        sensor["force_setpoint"] = FORCE
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()):
+        truth, out = Path(folder) / "truth.parquet", Path(folder) / "run.parquet"
+        url = f"bench://{case.arm}?" + "&".join(f"{key}={value}" for key, value in said.items())
+        why = ""
+        try:
+            dmpcli.execute(
+                drawn,
+                out,
+                robot=f"{url}&truth={truth}",
+                tool=TOOL,
+                approach=20.0,
+                **(sensor if case.coupled else {}),
+                **case.settings,
+            )
+        except DmpError as error:
+            why = f"exit {error.exit_code}: {error}"
+        result: dict[str, Any] = {"why": why}
+        if truth.exists() and out.exists():
+            result |= measured(case, said, drawn, truth, out)
+    return result
+
+
+def measured(
+    case: Case, said: dict[str, str], drawn: dmpcli.Trajectory, truth: Path, out: Path
+) -> dict[str, Any]:
+    """Measure a run by what truly happened."""
+    table = pq.read_table(truth)
+    true = {name: table[name].to_numpy() for name in table.column_names}
+    log = record.decode(file_io.read(out), schemas.RUN)
+    phase = np.asarray(log.columns["phase"])
+    cycle = np.minimum(true["setpoint"].astype(int) - 1, len(phase) - 1)
+    begun = np.flatnonzero(true["setpoint"] > 0)[0]
+    push, facts = true["push"], log.provenance.facts
+    before = (cycle < np.argmax(phase == "stroke")) if (phase == "stroke").any() else cycle >= 0
+    across = float(np.hypot(true["fx"], true["fy"]).max())
+    found: dict[str, Any] = {
+        "peak_all": float(push.max()),
+        "landing": float(push[before].max()),
+        "along": float(np.abs(true["fz"]).max()),
+        "across": across,
+        "states": [one["state"] for one in facts.get("contact_events", [])],
+    }
+    told = facts.get("contact", {})
+    found |= {key: told[key] for key in ("stiffness", "delay", "wall") if key in told}
+    if case.bench.get("surface") in ("wall", "slot"):
+        found["unavoidable"] = unavoidable(case, said, true)
+    # What a set-point says shows a look-ahead later.
+    step = true["t"][1] - true["t"][0]
+    late = round((float(said.get("delay", 0.0)) + LAG + PERIOD) / step)
+    on = np.zeros(len(push), dtype=bool)
+    rows = np.flatnonzero(phase[cycle] == "stroke")
+    rows = rows[rows >= begun] + late
+    on[rows[rows < len(on)]] = True
+    if not on.any():
+        return found
+    felt, asked = push[on], FORCE
+    if case.taught:
+        asked = np.asarray(log.columns["fn"])[cycle[np.flatnonzero(on) - late]]
+    found |= {
+        "contact": float((felt > 0.0).mean()),
+        "mean": float((felt - asked).mean()),
+        "rms": float(np.sqrt(np.mean((felt - asked) ** 2))),
+        "peak": float(felt.max()),
+    }
+    if case.coupled:
+        found |= regained(felt, np.asarray(log.columns["contact"])[cycle[on]], step)
+    tip = np.column_stack([true[key] for key in "xyz"])[on]
+    wanted = onto(case, said, drawn)
+    if wanted is not None and not case.brief:
+        tree = cKDTree(finely(wanted))
+        off, _ = tree.query(tip[felt > 0.0])
+        heights = [stroke_wave(path, START, GOAL, UP).value for path in (finely(wanted), tip[::20])]
+        same = len(heights[0]) == len(heights[1])
+        heights = [np.abs(np.diff(values)) for values in heights]
+        if len(off):
+            found["off"] = float(off.max())
+        if same:
+            found["wave"] = float(np.abs(heights[0] - heights[1]).max())
+    return found
+
+
+def regained(felt: Floats, state: AnyArray, step: float) -> dict[str, float]:
+    """How long a contact that was lost was gone, s, and what share of the rest it then held.
+
+    Parameters
+    ----------
+    felt : array, shape (n,)
+        N.
+    state : array of str, shape (n,)
+        Of the supervisor.
+    step : float
+        s.
+    """
+    lost = (state == "lost") | (state == "seeking")
+    if not lost.any():
+        return {}
+    again = np.flatnonzero((state == "drawing") & (np.arange(len(state)) > np.argmax(lost)))
+    if not len(again):
+        return {}
+    return {
+        "gap": float((felt[: again[0]] <= 0.0).sum() * step),
+        "after": float((felt[again[0] :] > 0.0).mean()),
+        "peak_after": float(felt[again[0] :].max()),
+    }
+
+
+def unavoidable(case: Case, said: dict[str, str], true: dict[str, Floats]) -> float:
+    """Force across the pen that a loop cannot avoid where it meets a wall, N; 0 where none is met.
+
+    The arm goes on at its speed into the wall, against its own stiffness in that direction, until
+    what was felt can show: a reading, a period, and the look-ahead of the arm.
+    """
+    across = np.hypot(true["fx"], true["fy"]) - 0.5 * np.abs(true["fz"])
+    hit = int(np.argmax(across > 2.0))
+    if not across[hit] > 2.0:
+        return 0.0
+    tip = np.column_stack([true[key] for key in "xyz"])
+    step = float(true["t"][1] - true["t"][0])
+    before = max(hit - round(0.1 / step), 0)
+    velocity = (tip[hit] - tip[before]) / (step * max(hit - before, 1))
+    worst = int(np.argmax(np.hypot(true["fx"], true["fy"])))
+    wall = np.array([true["fx"][worst], true["fy"][worst], 0.0])
+    wall /= np.linalg.norm(wall)
+    at = dict(zip("xyz", map(repr, tip[hit].tolist()), strict=True))
+    compliance = World(options.parameters(case.arm, said | at)).compliance
+    reaction = 1.0 / SENSOR_RATE + PERIOD + PERIOD + LAG + float(said.get("delay", 0.0))
+    return abs(float(velocity @ wall)) * reaction / float(wall @ compliance @ wall)
+
+
+def finely(path: Floats) -> Floats:
+    """A path, shape (n, 3), with twenty points where it has one."""
+    k = np.arange(len(path))
+    fine = np.linspace(0.0, len(path) - 1.0, 20 * len(path))
+    return np.column_stack([np.interp(fine, k, path[:, i]) for i in range(3)])
+
+
+def onto(case: Case, said: dict[str, str], drawn: dmpcli.Trajectory) -> Floats | None:
+    """Carry the plan along its normals onto the true surface; None where that has no closed form.
+
+    By Newton's steps: the distance that is left, over the cosine between both normals.
+    """
+    workpiece = options.parameters(case.arm, said).workpiece
+    if not isinstance(workpiece, Flat | Round) or drawn.rotation is None:
+        return None
+    surface, point = workpiece.surface, drawn.position.copy()
+    normal = -drawn.rotation[:, :, 2]  # the pen stands along the planned normal
+    if not case.coupled:
+        point = point + FORCE / float(said.get("stiffness", PEN)) * normal
+    for _ in range(20):
+        hit = surface.closest(point)
+        off = np.sum((point - hit.position) * hit.normal, axis=1)
+        point = point - (off / np.sum(normal * hit.normal, axis=1))[:, None] * normal
+    return point
+
+
+@lru_cache
+def effective(pen: float) -> float:
+    """Stiffness of a pen, contact and arm as the set-points meet it, N/mm: two depths, at rest."""
+    said = said_of(Case("", bench={"stiffness": repr(pen), "noise": "0"}), 0)
+    said["z"] = repr(float(START[2]))
+    parameters = options.parameters("ec66", said)
+    world, forces = World(parameters), []
+    for depth in (0.5, 1.5):
+        down = Pose(parameters.position - depth * UP, parameters.rotation)
+        for _ in range(40):
+            world.step(PERIOD, down)
+        forces.append(float(np.linalg.norm(world.contact_force)))
+    return forces[1] - forces[0]

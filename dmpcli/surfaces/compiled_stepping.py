@@ -1,0 +1,85 @@
+"""`geodesic_stepping` by compiled kernels, for meshes that are `compiled`; see there."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces import geodesic_stepping
+from dmpcli.surfaces.geodesic_stepping import Front
+from dmpcli.surfaces.triangle_mesh import ON_BORDER, TriangleMesh
+
+if TYPE_CHECKING:
+    from dmpcli.surfaces.kernels import stepping
+
+
+def start(
+    mesh: TriangleMesh,
+    position: Floats,
+    normal: Floats,
+    direction: Floats,
+    step: Floats,
+    sign: Floats,
+    part: Integers,
+) -> tuple[Front, Front]:
+    """Stand M walks at points of the mesh, and M that go the other way."""
+    from dmpcli.surfaces.kernels import stepping
+
+    def front(way: float) -> Front:
+        before, trend = np.empty_like(position), np.empty_like(position)
+        on = np.zeros(len(position))
+        return Front(
+            position.copy(), way * direction, normal.copy(), before, step, sign, part, trend, on
+        )
+
+    ahead, behind = front(1.0), front(-1.0)
+    stepping.start(mesh.facets, _limits(), _walks(ahead), _walks(behind))
+    return ahead, behind
+
+
+def walk(mesh: TriangleMesh, front: Front, steps: Integers) -> tuple[Booleans, Booleans]:
+    """Walk so many steps (M,) in place; tell which met a crease, and which were ever off."""
+    from dmpcli.surfaces.kernels import stepping
+
+    sharp, off = np.zeros((2, len(steps)), dtype=bool)
+    stepping.ends(mesh.facets, _limits(), _walks(front), steps, sharp, off)
+    return sharp, off
+
+
+def walk_lines(
+    mesh: TriangleMesh,
+    front: Front,
+    rows: tuple[Integers, Integers],
+    nodes: tuple[int, int],
+    out: tuple[Floats, Floats, Floats, Floats, Booleans, Booleans],
+) -> None:
+    """Fill nodes of lines.
+
+    Parameters
+    ----------
+    mesh, front
+    rows : array of int (M,), array of int (lines,)
+        Which line each walk is of, and how many nodes each line wants.
+    nodes : int, int
+        Where the walks stand, and 1 or -1 for the way along the line.
+    out : position, direction, normal (lines, count, 3), away, sharp, back (lines, count)
+    """
+    from dmpcli.surfaces.kernels import stepping
+
+    where = stepping.Nodes(*out)
+    stepping.lines(mesh.facets, _limits(), _walks(front), *rows, *nodes, where)
+
+
+def _limits() -> "stepping.Limits":
+    from dmpcli.surfaces.kernels import stepping
+
+    g = geodesic_stepping
+    return stepping.Limits(float(g.SHARP), g.BACK, g.JUMP, g.LANDING, ON_BORDER)
+
+
+def _walks(front: Front) -> "stepping.Walks":
+    from dmpcli.surfaces.kernels import stepping
+
+    f = front
+    arrays = f.position, f.direction, f.normal, f.before, f.step, f.sign, f.part, f.trend, f.away
+    return stepping.Walks(*arrays)

@@ -1,0 +1,288 @@
+"""The samples of strips, compiled: bicubic patch, closest point, smooth normal.
+
+Neighbouring samples lie on one facet or on the next. A sample is followed from facet to facet, and
+its foot is certified where nothing else of the mesh can be as near; the tree is asked otherwise.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.compiled import kernel
+from dmpcli.surfaces.kernels.tree import (
+    CLEARANCE,
+    EDGES,
+    FACE,
+    PART,
+    REACH,
+    SLOPE,
+    VERTICES,
+    Facets,
+    beyond_border,
+    closest,
+    corner,
+    flat_normal,
+    on_facet,
+    outward_of,
+    smooth_normal,
+    stack,
+)
+from dmpcli.surfaces.kernels.vectors import Vector, across, add, dot, length, sub, times, unit
+
+_NEAR = 0.3
+"""Samples further from their facet are looked for in the tree, mm."""
+
+_MOST = 8
+"""Facets that a sample is followed over."""
+
+_ROOM = 1e-9
+"""So much is kept to be certain in spite of rounding, mm."""
+
+
+@kernel
+def _beside(reals: Floats, row: int, k: int, p: Vector) -> float:
+    """How far a point lies beyond the line of an edge, in the facet's plane."""
+    return dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k]
+
+
+@kernel
+def _steepness(reals: Floats, numbers: Integers, row: int, other: int) -> float:
+    """How steep a facet that shares a corner leaves the plane of another, by the way outwards.
+
+    Over any point of it lies at most so much more height over the plane per distance from the
+    facet; infinite where its projection may fall back onto the facet.
+    """
+    n = flat_normal(reals, row)
+    steepest = np.inf
+    for mode in range(6):
+        k = mode % 3
+        way = outward_of(reals, row, k)
+        if mode >= 3:  # beyond the corner between two edges
+            way = unit(add(way, outward_of(reals, row, (k + 1) % 3)))
+        shared = numbers[row, VERTICES + (k + 1) % 3]
+        start = corner(reals, row, (k + 1) % 3)
+        worst = 0.0
+        for j in range(3):
+            v = numbers[other, VERTICES + j]
+            if v == shared or (mode < 3 and v == numbers[row, VERTICES + k]):
+                continue
+            gap = sub(corner(reals, other, j), start)
+            out, up = dot(way, gap), abs(dot(n, gap))
+            worst = max(worst, up / out) if out > 1e-12 else np.inf
+        steepest = min(steepest, worst)
+    return steepest
+
+
+@kernel
+def _apart(reals: Floats, row: int, other: int) -> float:
+    """Distance that two facets have at least: along edges, corners and normal of the first."""
+    n = flat_normal(reals, row)
+    a = corner(reals, row, 0)
+    least, most = np.inf, -np.inf
+    for j in range(3):
+        up = dot(n, sub(corner(reals, other, j), a))
+        least, most = min(least, up), max(most, up)
+    apart = max(least, -most, 0.0)
+    for mode in range(6):
+        k = mode % 3
+        way = outward_of(reals, row, k)
+        if mode >= 3:
+            way = unit(add(way, outward_of(reals, row, (k + 1) % 3)))
+        start = corner(reals, row, (k + 1) % 3)
+        out = np.inf
+        for j in range(3):
+            out = min(out, dot(way, sub(corner(reals, other, j), start)))
+        apart = max(apart, out)
+    return apart
+
+
+@kernel
+def _know(facets: Facets, row: int, nodes: Integers) -> None:
+    """Find clearance and slope of a facet, see `certified`."""
+    reals, numbers = facets.reals, facets.numbers
+    reach = 2.0 * _NEAR
+    low = np.empty(3)
+    high = np.empty(3)
+    for k in range(3):
+        a, b, c = reals[row, k], reals[row, 3 + k], reals[row, 6 + k]
+        low[k], high[k] = min(a, b, c) - reach, max(a, b, c) + reach
+    clearance, steepest = reach, 0.0
+    inner = len(facets.first) - 2
+    nodes[0], held = 0, 1
+    while held > 0:
+        held -= 1
+        node = nodes[held]
+        box = facets.boxes[node]
+        outside = False
+        for k in range(3):
+            outside |= box[k] > high[k] or box[3 + k] < low[k]
+        if outside:
+            continue
+        if node < inner:
+            nodes[held], nodes[held + 1] = 2 * node + 1, 2 * node + 2
+            held += 2
+            continue
+        leaf = node - inner
+        for other in range(facets.first[leaf], facets.first[leaf + 1]):
+            if other == row:
+                continue
+            touches = False
+            for i in range(3):
+                for j in range(3):
+                    touches |= numbers[row, VERTICES + i] == numbers[other, VERTICES + j]
+            if touches:
+                steepest = max(steepest, _steepness(reals, numbers, row, other))
+            else:
+                clearance = min(clearance, _apart(reals, row, other))
+    facets.reals[row, CLEARANCE] = max(clearance, 0.0)
+    # The tangent of half the angle.
+    facets.reals[row, SLOPE] = (
+        steepest / (1.0 + math.sqrt(1.0 + steepest * steepest)) if steepest < np.inf else np.inf
+    )
+
+
+@kernel
+def certified(facets: Facets, row: int, height: float, inside: float, nodes: Integers) -> bool:
+    """Tell whether the foot of a point within a facet is the closest of the whole mesh.
+
+    What shares no corner with the facet is at least its clearance away from it. What shares one
+    rises over the facet's plane by no more than its slope, from the edges on: seen from the foot,
+    a cone that begins `inside` away, mm, and that a point at a height stays off by more than the
+    height where inside > height tan(angle / 2).
+    """
+    if facets.reals[row, CLEARANCE] < 0.0:
+        _know(facets, row, nodes)
+    near = 2.0 * height + _ROOM < facets.reals[row, CLEARANCE]
+    return near and inside > height * facets.reals[row, SLOPE] + _ROOM
+
+
+@kernel
+def followed(
+    facets: Facets, p: Vector, row: int, nodes: Integers, offs: Floats
+) -> tuple[Vector, int]:
+    """Closest point of the mesh, and its row, from a facet nearby on."""
+    reals = facets.reals
+    for _ in range(_MOST):
+        edge, beside = 0, -np.inf
+        for k in range(3):
+            off = _beside(reals, row, k, p)
+            if off > beside:
+                edge, beside = k, off
+        if beside < 0.0:
+            height = abs(dot(flat_normal(reals, row), sub(p, corner(reals, row, 0))))
+            if height < _NEAR and certified(facets, row, height, -beside, nodes):
+                return on_facet(reals, row, p), row
+            break
+        row = facets.numbers[row, edge]
+        if row < 0:
+            break
+    return closest(facets, p, nodes, offs)
+
+
+class Strip(NamedTuple):
+    """Nodes of B strips, as `strip_grid.Nodes` says it."""
+
+    values: Floats
+    normal: Floats
+    stretch: Floats
+    away: Floats
+
+
+class Limits(NamedTuple):
+    """What `triangle_mesh` and `geodesic_stepping` call by these names."""
+
+    on_border: float
+    landing: float
+
+
+class Feet(NamedTuple):
+    """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met."""
+
+    foot: Floats
+    across: Floats
+    normal: Floats
+    face: Integers
+    stretch: Floats
+    beyond: Booleans
+    far: Booleans
+    back: Booleans
+
+
+@kernel
+def _weights(s: float) -> tuple[float, float, float, float]:
+    s2, s3 = s * s, s * s * s
+    return 1 - 3 * s2 + 2 * s3, s - 2 * s2 + s3, 3 * s2 - 2 * s3, s3 - s2
+
+
+@kernel
+def _slopes(s: float) -> tuple[float, float, float, float]:
+    s2 = s * s
+    return 6 * (s2 - s), 1 - 4 * s + 3 * s2, 6 * (s - s2), 3 * s2 - 2 * s
+
+
+@kernel
+def _patch(values: Floats, i: int, j: int, r: float, s: float) -> tuple[Vector, Vector]:
+    """Position and unnormalised e_v in a cell of nodes (nu, nv, 12)."""
+    a, b, c, d = _weights(r)
+    w0, w1, w2, w3 = _weights(s)
+    t0, t1, t2, t3 = _slopes(s)
+    p0, p1, q0, q1 = values[i, j], values[i, j + 1], values[i + 1, j], values[i + 1, j + 1]
+    x, y, z, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        near = (a * p0[k] + c * q0[k]) + (b * p0[6 + k] + d * q0[6 + k])
+        near_v = (a * p0[3 + k] + c * q0[3 + k]) + (b * p0[9 + k] + d * q0[9 + k])
+        far = (a * p1[k] + c * q1[k]) + (b * p1[6 + k] + d * q1[6 + k])
+        far_v = (a * p1[3 + k] + c * q1[3 + k]) + (b * p1[9 + k] + d * q1[9 + k])
+        value = w0 * near + w1 * near_v + w2 * far + w3 * far_v
+        slope = t0 * near + t1 * near_v + t2 * far + t3 * far_v
+        if k == 0:
+            x, dx = value, slope
+        elif k == 1:
+            y, dy = value, slope
+        else:
+            z, dz = value, slope
+    return (x, y, z), (dx, dy, dz)
+
+
+@kernel
+def lift(
+    facets: Facets,
+    strip: Strip,
+    u: Floats,
+    v: Floats,
+    sign: Floats,
+    part: Integers,
+    limits: Limits,
+    out: Feet,
+) -> None:
+    """Carry samples u, v (B, T), counted in nodes, through patches onto the mesh; fill `out`."""
+    nodes, offs = stack()
+    nu, nv = strip.values.shape[1] - 1, strip.values.shape[2] - 1
+    for b in range(len(u)):
+        row = -1
+        for k in range(u.shape[1]):
+            i = min(max(math.floor(u[b, k]), 0), nu - 1)
+            j = min(max(math.floor(v[b, k]), 0), nv - 1)
+            r, s = u[b, k] - i, v[b, k] - j
+            p, way = _patch(strip.values[b], i, j, r, s)
+            if row < 0:
+                foot, row = closest(facets, p, nodes, offs)
+            else:
+                foot, row = followed(facets, p, row, nodes, offs)
+            n = times(sign[b, 0], smooth_normal(facets.reals, foot, row))
+            a, c = i + (1 if r > 0.5 else 0), j + (1 if s > 0.5 else 0)
+            beyond = facets.numbers[row, PART] != part[b]
+            beyond = beyond or beyond_border(facets, p, foot, row, limits.on_border)
+            near = strip.normal[b, a, c]
+            out.back[b, k] = not beyond and dot(n, (near[0], near[1], near[2])) < 0.0
+            allowed = max(facets.reals[row, REACH], limits.landing * strip.away[b, i, j])
+            out.far[b, k] = not beyond and length(sub(p, foot)) > allowed
+            out.beyond[b, k] = beyond
+            out.stretch[b, k] = strip.stretch[b, a, c]
+            out.face[b, k] = facets.numbers[row, FACE]
+            out.foot[b, k, 0], out.foot[b, k, 1], out.foot[b, k, 2] = foot
+            out.normal[b, k, 0], out.normal[b, k, 1], out.normal[b, k, 2] = n
+            side = across(way, n)
+            out.across[b, k, 0], out.across[b, k, 1], out.across[b, k, 2] = side

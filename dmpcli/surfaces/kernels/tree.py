@@ -1,0 +1,338 @@
+"""The facets of a mesh as kernels want them: records in the order of a search tree.
+
+The tree halves the facets at the median of their middles, along the longest side of their box, so
+it needs no pointers: node i has the children 2i + 1 and 2i + 2. Boxes are rounded outwards to
+single precision, which halves what is fetched of them and costs no exactness.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dmpcli.arrays import Floats, Integers
+from dmpcli.compiled import kernel
+from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
+
+_LEAF = 4
+_BALL = 0.2**2
+"""A point that was predicted lies nearer to the mesh than this, mm², or is looked for anywhere."""
+
+
+class Facets(NamedTuple):
+    """Facets of a mesh in the tree's order, and the tree.
+
+    Few arrays: each costs when it is handed on, and what is asked of a facet lies together.
+
+    Attributes
+    ----------
+    boxes : array of float32, shape (nodes, 6)
+        Least and largest corner of what is in a node, mm.
+    first : array of int32, shape (leaves + 1,)
+        Where the facets of each leaf begin.
+    reals : array, shape (m, 40)
+        From 0: three corners; `NORMAL`: unit normal; `MAP`: affine map, 3 x 3 and 3, from a
+        position, counted from the first corner, to the smooth normal; `EDGES`: unit vectors in the
+        plane, square to the edges, outwards, and how far along them the edges lie; `REACH`, mm;
+        then, once known, what `samples.certified` asks: `CLEARANCE`, mm (-1 before), and `SLOPE`.
+    numbers : array of int32, shape (m, 16)
+        From 0: `Topology.neighbours`, in the tree's order; `FLAGS`: bits 0 to 2 are edges of the
+        border, 3 to 5 corners of it; `PART`: component; `FACE`: the mesh's own number; `VERTICES`.
+    """
+
+    boxes: Floats
+    first: Integers
+    reals: Floats
+    numbers: Integers
+
+
+NORMAL, MAP, EDGES, REACH, CLEARANCE, SLOPE, REALS = 9, 12, 24, 36, 37, 38, 40
+FLAGS, PART, FACE, VERTICES, NUMBERS = 3, 4, 5, 6, 16
+
+
+@kernel
+def _select(order: Integers, keys: Floats, low: int, high: int, middle: int) -> None:
+    """Part order[low:high] so that no key before `middle` is larger than one from there on."""
+    high -= 1
+    while low < high:
+        # The median of three, so that sorted facets are halved too.
+        a, b, c = keys[order[low]], keys[order[(low + high) // 2]], keys[order[high]]
+        pivot = max(min(a, b), min(max(a, b), c))
+        i, j = low, high
+        while i <= j:
+            while keys[order[i]] < pivot:
+                i += 1
+            while keys[order[j]] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            return
+
+
+@kernel
+def ordered(corners: Floats, depth: int) -> tuple[Integers, Integers]:
+    """Order of the facets (m, 3, 3) in a tree of so many levels below its root, and its leaves."""
+    m = len(corners)
+    middles = np.empty((3, m))
+    for k in range(3):
+        for i in range(m):
+            middles[k, i] = corners[i, 0, k] + corners[i, 1, k] + corners[i, 2, k]
+    order = np.arange(m).astype(np.int32)
+    bounds = np.empty(2, dtype=np.int32)
+    bounds[0], bounds[1] = 0, m
+    for _ in range(depth):
+        finer = np.empty(2 * len(bounds) - 1, dtype=np.int32)
+        for i in range(len(bounds) - 1):
+            low, high = bounds[i], bounds[i + 1]
+            half = (low + high) // 2
+            axis, widest = 0, -1.0
+            for k in range(3):
+                least, most = np.inf, -np.inf
+                for j in range(low, high):
+                    least = min(least, middles[k, order[j]])
+                    most = max(most, middles[k, order[j]])
+                if most - least > widest:
+                    axis, widest = k, most - least
+            if high - low > 1:
+                _select(order, middles[axis], low, high, half)
+            finer[2 * i], finer[2 * i + 1] = low, half
+        finer[-1] = m
+        bounds = finer
+    return order, bounds
+
+
+def depth_of(count: int) -> int:
+    """Levels below the root, so that leaves hold `_LEAF` facets or less."""
+    depth = 0
+    while count > _LEAF << depth:
+        depth += 1
+    return depth
+
+
+@kernel
+def boxes_of(reals: Floats, first: Integers) -> Floats:
+    """Boxes of all nodes."""
+    leaves = len(first) - 1
+    boxes = np.empty((2 * leaves - 1, 6))
+    for leaf in range(leaves):
+        box = boxes[leaves - 1 + leaf]
+        box[:3], box[3:] = np.inf, -np.inf
+        for i in range(first[leaf], first[leaf + 1]):
+            for c in range(9):
+                box[c % 3] = min(box[c % 3], reals[i, c])
+                box[3 + c % 3] = max(box[3 + c % 3], reals[i, c])
+    for node in range(leaves - 2, -1, -1):
+        for k in range(3):
+            boxes[node, k] = min(boxes[2 * node + 1, k], boxes[2 * node + 2, k])
+            boxes[node, 3 + k] = max(boxes[2 * node + 1, 3 + k], boxes[2 * node + 2, 3 + k])
+    return boxes
+
+
+@kernel
+def fill(reals: Floats, normals: Floats) -> None:
+    """Fill in map and edges of facets whose corners have normals (m, 3, 3)."""
+    for i in range(len(reals)):
+        n = flat_normal(reals, i)
+        a, b, c = corner(reals, i, 0), corner(reals, i, 1), corner(reals, i, 2)
+        opposite = (sub(c, b), sub(a, c), sub(b, a))
+        for k in range(3):
+            way = opposite[2] if k == 0 else opposite[0] if k == 1 else opposite[1]
+            outward = cross(unit(way), n)
+            at = EDGES + 3 * k
+            reals[i, at], reals[i, at + 1], reals[i, at + 2] = outward
+            reals[i, EDGES + 9 + k] = dot(outward, corner(reals, i, k))
+        # Gradients of the barycentric coordinates: exact on slivers too.
+        area = cross(opposite[0], opposite[1])
+        size = dot(area, area)
+        g0 = times(1.0 / size, cross(area, opposite[0]))
+        g1 = times(1.0 / size, cross(area, opposite[1]))
+        g2 = times(1.0 / size, cross(area, opposite[2]))
+        for k in range(3):
+            slope = add(times(normals[i, 0, k], g0), times(normals[i, 1, k], g1))
+            slope = add(slope, times(normals[i, 2, k], g2))
+            at = MAP + 3 * k
+            reals[i, at], reals[i, at + 1], reals[i, at + 2] = slope
+            reals[i, MAP + 9 + k] = normals[i, 0, k]
+
+
+@kernel
+def corner(reals: Floats, row: int, k: int) -> Vector:
+    """Corner k of a facet."""
+    return reals[row, 3 * k], reals[row, 3 * k + 1], reals[row, 3 * k + 2]
+
+
+@kernel
+def flat_normal(reals: Floats, row: int) -> Vector:
+    """Unit normal of a facet."""
+    return reals[row, NORMAL], reals[row, NORMAL + 1], reals[row, NORMAL + 2]
+
+
+@kernel
+def outward_of(reals: Floats, row: int, k: int) -> Vector:
+    """Unit vector in a facet's plane, square to an edge."""
+    at = EDGES + 3 * k
+    return reals[row, at], reals[row, at + 1], reals[row, at + 2]
+
+
+@kernel
+def smooth_normal(reals: Floats, p: Vector, row: int) -> Vector:
+    """Unit normal at a point of a facet, interpolated between the corners'."""
+    x, y, z = p[0] - reals[row, 0], p[1] - reals[row, 1], p[2] - reals[row, 2]
+    m = MAP
+    return unit(
+        (
+            reals[row, m] * x + reals[row, m + 1] * y + reals[row, m + 2] * z + reals[row, m + 9],
+            reals[row, m + 3] * x
+            + reals[row, m + 4] * y
+            + reals[row, m + 5] * z
+            + reals[row, m + 10],
+            reals[row, m + 6] * x
+            + reals[row, m + 7] * y
+            + reals[row, m + 8] * z
+            + reals[row, m + 11],
+        )
+    )
+
+
+@kernel
+def on_facet(reals: Floats, row: int, p: Vector) -> Vector:
+    """Closest point of a facet (C. Ericson: Real-time collision detection, 2005, sec. 5.1.5)."""
+    a = corner(reals, row, 0)
+    b = corner(reals, row, 1)
+    c = corner(reals, row, 2)
+    ab, ac, ap = sub(b, a), sub(c, a), sub(p, a)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    if d1 <= 0.0 and d2 <= 0.0:
+        return a
+    bp = sub(p, b)
+    d3, d4 = dot(ab, bp), dot(ac, bp)
+    if d3 >= 0.0 and d4 <= d3:
+        return b
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return add(a, times(d1 / (d1 - d3), ab))
+    cp = sub(p, c)
+    d5, d6 = dot(ab, cp), dot(ac, cp)
+    if d6 >= 0.0 and d5 <= d6:
+        return c
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return add(a, times(d2 / (d2 - d6), ac))
+    va = d3 * d6 - d5 * d4
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        return add(b, times((d4 - d3) / ((d4 - d3) + (d5 - d6)), sub(c, b)))
+    share = 1.0 / (va + vb + vc)
+    return add(add(a, times(vb * share, ab)), times(vc * share, ac))
+
+
+@kernel
+def _off_box(boxes: Floats, node: int, p: Vector) -> float:
+    """Squared distance of a point from a box."""
+    x = max(boxes[node, 0] - p[0], p[0] - boxes[node, 3], 0.0)
+    y = max(boxes[node, 1] - p[1], p[1] - boxes[node, 4], 0.0)
+    z = max(boxes[node, 2] - p[2], p[2] - boxes[node, 5], 0.0)
+    return x * x + y * y + z * z
+
+
+@kernel
+def _lower(reals: Floats, row: int, p: Vector) -> float:
+    """What the squared distance from a facet is at least: over its plane, or beside an edge."""
+    off = abs(dot(flat_normal(reals, row), sub(p, corner(reals, row, 0))))
+    for k in range(3):
+        off = max(off, dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k])
+    return off * off
+
+
+@kernel
+def _within(
+    facets: Facets, p: Vector, bound: float, nodes: Integers, offs: Floats
+) -> tuple[Vector, int]:
+    """Closest point nearer than a squared bound, and its row; -1 without one."""
+    best, foot, row = bound, p, -1
+    inner = len(facets.first) - 2
+    nodes[0], offs[0] = 0, _off_box(facets.boxes, 0, p)
+    held = 1
+    while held > 0:
+        held -= 1
+        node = nodes[held]
+        if offs[held] >= best:
+            continue
+        while node < inner:
+            left, right = 2 * node + 1, 2 * node + 2
+            near, far = _off_box(facets.boxes, left, p), _off_box(facets.boxes, right, p)
+            if far < near:
+                left, right, near, far = right, left, far, near
+            if far < best:
+                nodes[held], offs[held] = right, far
+                held += 1
+            if near >= best:
+                node = -1
+                break
+            node = left
+        if node < 0:
+            continue
+        leaf = node - inner
+        for i in range(facets.first[leaf], facets.first[leaf + 1]):
+            if _lower(facets.reals, i, p) >= best:
+                continue
+            q = on_facet(facets.reals, i, p)
+            gap = sub(p, q)
+            off = dot(gap, gap)
+            if off < best:
+                best, foot, row = off, q, i
+    return foot, row
+
+
+@kernel
+def stack() -> tuple[Integers, Floats]:
+    """Room for one search after another."""
+    return np.empty(64, dtype=np.int32), np.empty(64)
+
+
+@kernel
+def closest(facets: Facets, p: Vector, nodes: Integers, offs: Floats) -> tuple[Vector, int]:
+    """Closest point of the mesh, and its row."""
+    foot, row = _within(facets, p, _BALL, nodes, offs)
+    if row < 0:
+        foot, row = _within(facets, p, np.inf, nodes, offs)
+    return foot, max(row, 0)
+
+
+@kernel
+def search(facets: Facets, points: Floats) -> tuple[Floats, Integers]:
+    """Closest points (N, 3), mm, and their faces (N,)."""
+    nodes, offs = stack()
+    feet, face = np.empty_like(points), np.empty(len(points), dtype=np.int64)
+    for i in range(len(points)):
+        foot, row = closest(facets, (points[i, 0], points[i, 1], points[i, 2]), nodes, offs)
+        feet[i, 0], feet[i, 1], feet[i, 2] = foot
+        face[i] = facets.numbers[row, FACE]
+    return feet, face
+
+
+@kernel
+def beyond_border(facets: Facets, p: Vector, foot: Vector, row: int, least: float) -> bool:
+    """Tell whether a point lies beside the mesh; see `TriangleMesh.beyond_border`."""
+    reals, flags = facets.reals, facets.numbers[row, FLAGS]
+    if flags == 0:
+        return False
+    gap, n = sub(p, foot), flat_normal(reals, row)
+    if length(sub(gap, times(dot(gap, n), n))) <= least:
+        return False
+    for k in range(3):
+        a = corner(reals, row, k)
+        offset = sub(foot, a)
+        if flags & (8 << k) and length(offset) < 1e-6:
+            return True
+        if flags & (1 << k):
+            edge = sub(corner(reals, row, (k + 1) % 3), a)
+            along = min(max(dot(offset, edge) / dot(edge, edge), 0.0), 1.0)
+            if length(sub(offset, times(along, edge))) < 1e-6:
+                return True
+    return False

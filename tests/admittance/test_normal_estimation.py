@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmpcli.admittance.normal_estimation import NormalEstimator, turned
+from dmpcli.spatial.rotations import exp, smallest_between
+
+PERIOD = 0.02
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def angle(a, b):
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def slid(normal, mu, path, seed=0, noise=0.05, push=5.0, knocks=0):
+    """An estimator that has slid along a path, shape (n, 2) in mm, of a surface through 0."""
+    rng = np.random.default_rng(seed)
+    height = -(path @ normal[:2]) / normal[2]
+    position = np.column_stack([path, height])
+    velocity = np.gradient(position, PERIOD, axis=0)
+    estimator, found = NormalEstimator(PERIOD), []
+    for i, v in enumerate(velocity):
+        speed = np.linalg.norm(v)
+        rub = mu * v / speed if speed > 0 else 0.0
+        force = push * (normal - rub) + noise * rng.standard_normal(3)
+        if knocks and i % knocks == 0:
+            force = force + [6.0, -4.0, 0.0]
+        estimator.feel(force, v + 0.3 * rng.standard_normal(3), UP)
+        found.append(estimator.normal)
+    return estimator, np.array(found)
+
+
+T = np.arange(0.0, 10.0, PERIOD)
+WAVE = np.column_stack([-10.0 * T, 25.0 * np.sin(2 * np.pi * T / 10.0)])
+LINE = np.column_stack([-15.0 * T, 0.0 * T])
+
+
+@pytest.mark.parametrize("path", [WAVE, LINE], ids=["wave", "line"])
+@pytest.mark.parametrize("tilt", [0.0, 3.0, 5.0])
+@pytest.mark.parametrize("about", [0.0, 90.0, 200.0])
+def test_tilt_and_friction_of_a_plane_are_found(path, tilt, about):
+    axis = np.array([np.cos(np.radians(about)), np.sin(np.radians(about)), 0.0])
+    normal = exp(np.radians(tilt) * axis) @ UP
+    estimator, found = slid(normal, 0.2, path)
+    off = [angle(one, normal) for one in found[50:]]
+    assert np.mean(off) < 0.5
+    assert max(off) < 1.2
+    assert estimator.friction == pytest.approx(0.2, abs=0.03)
+    assert np.degrees(estimator.angle) == pytest.approx(tilt, abs=1.0)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.4])
+def test_friction_that_is_other_than_usual_is_found(mu):
+    estimator, found = slid(UP, mu, WAVE)
+    assert estimator.friction == pytest.approx(mu, abs=0.03)
+    # Taken as a tilt, that friction would lean the normal by 22°.
+    assert max(angle(one, UP) for one in found[50:]) < 1.2
+
+
+def test_knocks_count_less():
+    estimator, found = slid(UP, 0.2, WAVE, knocks=25)
+    assert max(angle(one, UP) for one in found[100:]) < 3.0
+    assert estimator.friction == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_tool_that_stands_or_is_lifted_tells_nothing():
+    estimator = NormalEstimator(PERIOD)
+    assert not estimator.feel(np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]), UP)
+    assert not estimator.feel(np.array([1.0, 0.0, -0.1]), np.array([20.0, 0.0, 0.0]), UP)
+    np.testing.assert_allclose(estimator.normal, UP)
+    assert estimator.heard == 0
+
+
+def test_the_tilt_goes_along_with_a_planned_normal_that_turns():
+    """Round a cylinder of the plan, 4° off it all the way about the cylinder's axis."""
+    estimator, off = NormalEstimator(PERIOD), []
+    lean = np.radians(4.0)
+    for phi in np.linspace(0.0, 0.8, 400):
+        planned = np.array([np.sin(phi), 0.0, np.cos(phi)])
+        true = np.array([np.sin(phi + lean), 0.0, np.cos(phi + lean)])
+        slide = np.array([np.cos(phi + lean), 0.0, -np.sin(phi + lean)])
+        estimator.feel(5.0 * (true - 0.2 * slide), 15.0 * slide, planned)
+        off.append(angle(estimator.normal, true))
+    assert max(off[50:]) < 0.5
+
+
+unit = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda v: v @ v > 0.01)
+
+
+@settings(max_examples=50)
+@given(unit, unit, unit, st.floats(0.01, 0.5), st.floats(0.001, 0.2))
+def test_a_normal_that_is_used_stays_within_its_bounds(a, b, c, most, step):
+    now, wanted, planned = (v / np.linalg.norm(v) for v in (a, b, c))
+    made = turned(now, wanted, planned, most, step)
+    assert np.linalg.norm(made) == pytest.approx(1.0)
+    assert np.radians(angle(made, now)) <= step + 1e-6
+    again = turned(made, wanted, planned, most, step)
+    inside = turned(planned, wanted, planned, most, np.pi)
+    assert np.radians(angle(inside, planned)) <= most + 1e-6
+    assert angle(again, inside) <= angle(made, inside) + 1e-6
+
+
+def test_planned_normals_that_point_anywhere_have_axes():
+    for n in (UP, -UP, np.array([1.0, 0.0, 0.0]), np.array([0.6, -0.8, 0.0])):
+        estimator = NormalEstimator(PERIOD)
+        R = smallest_between(UP, n) if n[2] > -1 else np.diag([1.0, -1.0, -1.0])
+        for _ in range(100):
+            estimator.feel(R @ [-1.0, 0.0, 5.0], R @ [20.0, 0.0, 0.0], n)
+        assert angle(estimator.normal, n) < 0.5
