@@ -4,13 +4,8 @@ Nothing here grows with the batch but a few numbers per stroke; what every strok
 goes into CSV files as it is measured.
 """
 
-<<<<<<< HEAD
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-=======
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
->>>>>>> main
 from typing import TextIO
 
 import numpy as np
@@ -235,12 +230,8 @@ def measure(
     label: str,
     sight: MeasurementContext,
     tables: Tables | None,
-<<<<<<< HEAD
     advance: Advance,
-=======
-    advance: Callable[[int], None],
     elsewhere: Measure | None = None,
->>>>>>> main
 ) -> MeasuredBatch:
     """Measure all strokes of a batch.
 

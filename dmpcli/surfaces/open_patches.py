@@ -31,11 +31,13 @@ _STRETCHES = (1.0, 0.85, 0.7, 0.55)
 
 _TURNS = np.radians(np.concatenate([[0.0, 90.0], np.arange(15.0, 360.0, 15.0)]))
 _GRID = 9
-_ALONG, _ACROSS = 9, 5
-_MORE = 0.02
-"""Of a stroke's size, left free around it."""
+_MORE = 0.04
+"""By how much a stroke must have room, too, if it were larger, as a share of its size."""
 
-_TRIED = 2
+_TRIED = 3
+
+_UPWARDS = 0.7
+"""Cosine of the angle to base z up to which a facet is the upper side of a round patch."""
 
 
 @dataclass(frozen=True)
@@ -88,13 +90,12 @@ class Footprint:
     ----------
     length : float
         From start to goal, mm; 0 of a closed stroke.
-    low, high : array, shape (2,)
-        Least and largest u and v, mm.
+    path : array, shape (k, 2)
+        Its u and v, mm.
     """
 
     length: float
-    low: Floats
-    high: Floats
+    path: Floats
 
 
 def places_for(V: Floats, F: Integers, stroke: Footprint, most: int = 8) -> Iterator[list[Patch]]:
@@ -164,6 +165,17 @@ class _Patches:
             found = self.mesh.closest(corners[np.argmax(weight)].mean(axis=0)[None])
         return found.position[0], found.normal[0]
 
+    def middles(self, number: int) -> Iterator[tuple[Floats, Floats]]:
+        """Points to look around, with the normals there: of a round patch its upper side first."""
+        middle, n = self.middle(number)
+        upper = (self.label == number) & (self.normal[:, 2] > _UPWARDS)
+        if n[2] < _UPWARDS and upper.any():
+            corners, weight = self._corners[upper], self._doubled[upper]
+            top = np.average(corners.mean(axis=1), axis=0, weights=weight)
+            found = self.mesh.closest(top[None])
+            yield found.position[0], found.normal[0]
+        yield middle, n
+
     def holds(self, number: int, points: Floats, size: float) -> tuple[Booleans, Floats, Floats]:
         """Tell which points (..., 3) lie over a patch; with their feet and the normals there."""
         seen = self.mesh.closest(points)
@@ -209,7 +221,17 @@ def _way(whole: _Patches, number: int) -> tuple[Floats, Floats] | None:
 
 def _ways_for(whole: _Patches, number: int, stroke: Footprint) -> list[tuple[Floats, Floats]]:
     """Return starts and goals of ways on a patch that leave room for a whole stroke."""
-    middle, n = whole.middle(number)
+    for middle, n in whole.middles(number):
+        found = _ways_about(whole, number, stroke, middle, n)
+        if found:
+            return found
+    return []
+
+
+def _ways_about(
+    whole: _Patches, number: int, stroke: Footprint, middle: Floats, n: Floats
+) -> list[tuple[Floats, Floats]]:
+    """Return such ways near a point of the patch with the normal n."""
     e_1 = np.array([1.0, 0.0, 0.0]) - n[0] * n
     e_1 = unit(e_1) if np.linalg.norm(e_1) > 0.1 else unit(np.array([0.0, 1.0, 0.0]) - n[1] * n)
     e_2 = np.cross(n, e_1)
@@ -232,18 +254,11 @@ def _ways_for(whole: _Patches, number: int, stroke: Footprint) -> list[tuple[Flo
     )  # (k, turns, 3)
     across = np.cross(normals[:, None], along)
     for stretch in _STRETCHES if stroke.length else _STRETCHES[:1]:
-        scale = np.array([stretch, 1.0])
-        least, most = stroke.low * scale, stroke.high * scale
-        rim = _MORE * float(np.linalg.norm(most - least))
-        u, v = (
-            np.linspace(p - rim, q + rim, count)
-            for p, q, count in zip(least, most, (_ALONG, _ACROSS), strict=True)
-        )
-        centre = 0.5 * (least + most)
-        u, v = (g.ravel() for g in np.meshgrid(u - centre[0], v - centre[1]))
-        points = (
-            feet[:, None, None] + u[:, None] * along[:, :, None] + v[:, None] * across[:, :, None]
-        )
+        path = stroke.path * [stretch, 1.0]
+        centre = 0.5 * (path.min(axis=0) + path.max(axis=0))
+        u, v = np.concatenate([path - centre, (1.0 + _MORE) * (path - centre)]).T
+        points = u[:, None] * along[:, :, None] + v[:, None] * across[:, :, None]
+        points += feet[:, None, None]
         good = whole.holds(number, points, size)[0].all(axis=-1)
         rows, ways = np.nonzero(good)
         if len(rows) == 0:

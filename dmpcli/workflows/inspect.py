@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from dmpcli.errors import InputError
 from dmpcli.messages import tell
 from dmpcli.records import file_io, learned_skill, mesh
@@ -55,7 +57,7 @@ def _rooms(file: str, found: Row, skill: Path) -> list[str]:
     if places:
         return [f"room for {skill}: {mesh.as_options(place)}" for place in places]
     room = room_for.footprint(learned)
-    along, across = room.high - room.low
+    along, across = np.ptp(room.path, axis=0)
     return [
         f"room for {skill}: on none of its smooth patches ({along:.0f} mm along, {across:.0f} mm "
         "across); --amplitude scale makes a shorter stroke lower, and over rounded edges one may "

@@ -13,7 +13,7 @@ from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.open_patches import Footprint, Patch, places_for
 from dmpcli.workflows.generalize import Order, prepared
 from dmpcli.workflows.generalize_inputs import one_pair
-from dmpcli.workflows.single import draw_one
+from dmpcli.workflows.single import CREASE, draw_one
 from dmpcli.workflows.surface_input import SurfaceInput
 
 MOST = 3
@@ -22,7 +22,7 @@ MOST = 3
 DIGITS = 1
 """Of their coordinates, mm."""
 
-_SAMPLES = 200
+_SAMPLES = 120
 
 
 def footprint(skill: LearnedSkill) -> Footprint:
@@ -40,7 +40,7 @@ def footprint(skill: LearnedSkill) -> Footprint:
         )
     seen = demonstrated_scale(skill, np.linspace(0.0, skill.duration, _SAMPLES))[:, :2]
     length = 0.0 if skill.closed else float(skill.goal[0] - skill.start[0])
-    return Footprint(length, seen.min(axis=0), seen.max(axis=0))
+    return Footprint(length, seen)
 
 
 def rooms_for(read: SurfaceInput, skill: LearnedSkill) -> list[Patch]:
@@ -81,11 +81,11 @@ def _drawn(read: SurfaceInput, skill: LearnedSkill, place: Patch) -> bool:
     table = one_pair(_three(place.start), _three(place.goal), None, None)
     settings = resolve(GeneralizeSettings, {}, None)
     try:
-        with heard():
+        with heard() as told:
             draw_one(prepared(Order(skill, table, settings, read)))
     except DmpError:
         return False
-    return True
+    return all(text != CREASE for _, text in told)
 
 
 def _three(point: Floats) -> tuple[float, float, float]:
