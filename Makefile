@@ -146,6 +146,7 @@ bench: $(VENV)/installed
 	$(BIN)/python -m benchmarks.registration
 	$(BIN)/python -m benchmarks.lateness
 	$(BIN)/python -m benchmarks.live_view
+	$(BIN)/python -m benchmarks.report_page
 	$(BIN)/python -m benchmarks.batches $(OUT)/batches
 
 # Programs of others that take long to install judge what export writes, in an environment of their own.
