@@ -9,7 +9,9 @@ walked again, at most `_PASSES` times, until these no longer change.
 Which u, v a foot has on an edge: closest points of all that stands over a convex edge lie on it, so
 that several u, v lead to one foot there. The one over the facet that the search names is taken. The
 others lie beside it by no more than the spline's height over the mesh times the angle at the edge,
-and every one of them leads to the position.
+and every one of them leads to the position. Where the spline runs under a convex edge, or over a
+concave one, none leads to points of the edge; such strokes are left to `tangential`, which comes as
+near as it can.
 """
 
 from collections.abc import Iterator
@@ -232,7 +234,8 @@ class _Strip:
         """Move the coordinates of some strokes; tell which came to rest."""
         here, step = at[rows], self.step[rows]
         spline = Spline(self.nodes.values)
-        sound, size = np.ones(here.shape[:2], dtype=bool), np.zeros(here.shape[:2])
+        # Each stroke on its own: one that rests must not move on because others do.
+        rest = np.zeros(len(rows), dtype=bool)
         for _ in range(_STEPS):
             i, j, r, s = self._where(here, step)
             point, by_u, by_v = spline.at(rows[:, None], i, j, r, s)
@@ -245,13 +248,15 @@ class _Strip:
             du = dot(facet, cross(e, by_v))[..., 0] * scale
             dv = dot(facet, cross(by_u, e))[..., 0] * scale
             size = np.hypot(du, dv)
-            short = np.minimum(1.0, _LONGEST / np.maximum(size, 1e-300)) * sound
+            short = np.minimum(1.0, _LONGEST / np.maximum(size, 1e-300))
+            short *= sound & ~rest[:, None]
             here[..., 0] += short * du
             here[..., 1] += short * dv
-            if (size < enough).all():
+            rest |= (sound & (size < enough)).all(axis=1)
+            if rest.all():
                 break
         at[rows] = here
-        return np.asarray((sound & (size < enough)).all(axis=1))
+        return rest
 
 
 class Spline:

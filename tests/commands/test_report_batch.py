@@ -217,3 +217,25 @@ def test_a_part_that_lacks_a_pair_or_runs_backwards_is_named(tmp_path, demo):
     found.columns["t"][501 + 7] = 0.0
     part.write_bytes(record.encode(found))
     assert "column 't', row 509: time does not increase" in refused(demo, folder)
+
+
+@pytest.mark.slow
+def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder):
+    written = []
+    for jobs in (1, 2):
+        output = tmp_path / f"jobs-{jobs}"
+        result = dmpcli(demo, folder, "-o", output, "--jobs", jobs, "-q")
+        assert result.exit_code == 0
+        names = ("report.json", "strokes.csv", "wave_heights.csv")
+        written.append([result.stdout, *((output / name).read_bytes() for name in names)])
+    assert written[0] == written[1]
+
+
+def test_a_damaged_part_is_named_from_another_process_too(demo, folder):
+    part = folder / "part-00001.parquet"
+    whole = bytearray(part.read_bytes())
+    whole[200:1200] = bytes(1000)
+    part.write_bytes(whole)
+    result = dmpcli(demo, folder, "--jobs", 2, "-q")
+    assert result.exit_code == 2
+    assert "part-00001.parquet" in result.stderr

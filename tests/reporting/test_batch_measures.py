@@ -1,5 +1,7 @@
 """Strokes of a batch measured together have the figures that each has on its own."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from dmpcli.reporting.batch_measures import FIGURES, MeasurementContext, measure
 from dmpcli.reporting.report_surface import ReportSurface, placed
 from dmpcli.reporting.strokes import pairs_of, strokes_of
 from dmpcli.spatial import rotations
+from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
 from tests.reporting.batches import put_batch
@@ -172,6 +175,48 @@ def test_on_a_mesh(tmp_path):
     assert column(table, "surface_tilt_max")[0] < 1.0
     # Without the surface a stroke that is not plane has no wave height.
     assert np.isnan(column(alike(folder, taught()), "wave_height")).all()
+
+
+@pytest.mark.parametrize("model", ["modified", "original"])
+@pytest.mark.parametrize("count", [1, 5])
+def test_on_a_cylinder(tmp_path, model, count):
+    radius = 400.0
+    tube = Cylinder(START - [0.0, 0.0, radius], np.array([1.0, 0.0, 0.0]), radius)
+    made = strokes(count, n=101)
+    for i, stroke in enumerate(made):
+        hits = tube.closest(stroke["path"])
+        stroke["path"] = hits.position + 0.2 * i * hits.normal
+        stroke["normals"] = hits.normal
+        stroke["ends"] = (stroke["path"][0] + [0.0, 0.0, 0.1], stroke["path"][-1])
+        turn = np.stack([np.sin(stroke["t"]), np.zeros(101), np.zeros(101)], axis=-1)
+        stroke["euler"] = np.array([np.pi, 0.0, 0.0]) + 0.3 * turn
+        del stroke["normal"]
+    folder = put_batch(tmp_path / "b", [made], facts={"model": model})
+    table = alike(folder, taught(), ReportSurface("tube", tube), None)
+    assert np.isfinite(column(table, "surface_tilt_mean")).all()
+    assert np.isfinite(column(table, "surface_length_change")).all()
+
+
+def test_parts_measured_apart_are_measured_alike(tmp_path):
+    folder = put_batch(tmp_path / "b", [strokes(9), strokes(7, seed=5)], ["line 20: no geodesic"])
+    batch, _ = dataset.read(folder)
+    plane = ReportSurface("plane", Plane(START, np.array(UP)))
+    sight = MeasurementContext(taught(), plane, np.array(UP))
+    asked = []
+
+    def elsewhere(how, of, tasks):
+        assert of is batch
+        for part, chosen in tasks:
+            # What travels is a part's own rows, and nothing that cannot.
+            asked.append(len(part))
+            how, part = pickle.loads(pickle.dumps((how, part)))
+            yield pickle.loads(pickle.dumps(how.part(part, chosen)))
+
+    one = measure(batch, "b", sight, None, lambda _: None)
+    other = measure(batch, "b", sight, None, lambda _: None, elsewhere)
+    assert asked == [9, 7]
+    np.testing.assert_array_equal(other.table, one.table)
+    assert [s.label for s in other.shown] == [s.label for s in one.shown]
 
 
 def test_the_original_model_with_its_far_points(tmp_path):

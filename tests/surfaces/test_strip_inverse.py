@@ -1,0 +1,100 @@
+"""Strips inverted on their own nodes: what the chart drew is found, foot by foot."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from dmpcli.surfaces import strip_inverse
+from dmpcli.surfaces.inverse_chart import _by_steps, invert
+from dmpcli.surfaces.mesh import Mesh
+from tests.surfaces import cases
+
+S = np.linspace(0.0, 1.0, 120)
+
+
+@pytest.fixture(scope="module")
+def bumpy():
+    return cases.mesh("bumpy", 8_000)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    made = trimesh.creation.icosphere(subdivisions=3, radius=100.0)
+    return Mesh(made.vertices, made.faces)
+
+
+def laid(surface, headings=3, half=54.0, top=5.0):
+    angle = 2.0 * np.arange(headings) + 0.3
+    way = half * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+    above = np.array([0.0, 0.0, top])
+    ends = surface.closest(above - way), surface.closest(above + way)
+    return surface.charts(ends[0].position, ends[1].position)
+
+
+def wave(charts, wide=25.0, height=0.0):
+    u = charts.lengths[:, None] * S
+    v = np.broadcast_to(wide * np.sin(4 * np.pi * S), u.shape)
+    return np.stack([u, v, np.full(u.shape, height)], axis=-1)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
+def test_what_a_chart_drew_is_found_on_its_own_nodes(bumpy, height):
+    charts = laid(bumpy)
+    wanted = wave(charts, height=height)
+    drawn = charts.lift(wanted)
+    found = strip_inverse.found(charts, drawn.position)
+    assert found.rows.tolist() == [0, 1, 2]
+    np.testing.assert_allclose(found.coordinates, wanted, atol=2e-6)
+    again = charts.lift(found.coordinates)
+    assert np.abs(again.position - drawn.position).max() < 1e-6
+    assert found.miss.max() <= 1e-6
+
+
+def test_it_agrees_with_the_search_that_lifts_what_it_tries(bumpy):
+    charts = laid(bumpy)
+    drawn = charts.lift(wave(charts, wide=18.0))
+    quick, slow = invert(charts, drawn.position), _by_steps(charts, drawn.position)
+    assert quick.complete.all()
+    assert slow.complete.all()
+    np.testing.assert_allclose(quick.coordinates, slow.coordinates, atol=5e-6)
+    np.testing.assert_allclose(quick.axes, slow.axes, atol=1e-6)
+
+
+def test_a_stroke_is_found_alike_alone_and_among_others(bumpy):
+    charts = laid(bumpy)
+    position = charts.lift(wave(charts)).position
+    together = strip_inverse.found(charts, position)
+    for row in (0, 2):
+        alone = strip_inverse.found(charts.rows(np.array([row])), position[row : row + 1])
+        np.testing.assert_array_equal(alone.coordinates[0], together.coordinates[row])
+        np.testing.assert_array_equal(alone.axes[0], together.axes[row])
+
+
+def test_positions_far_off_the_mesh_are_left_to_the_search(bumpy):
+    charts = laid(bumpy, headings=1)
+    wanted = wave(charts, height=6.0)
+    drawn = charts.lift(wanted)
+    assert len(strip_inverse.found(charts, drawn.position).rows) == 0
+    np.testing.assert_allclose(invert(charts, drawn.position).coordinates, wanted, atol=2e-6)
+
+
+def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facets(ball):
+    charts = laid(ball, headings=2, half=40.0, top=95.0)
+    drawn = charts.lift(wave(charts, wide=12.0)).position
+    # On a ball of facets every edge is convex: put each point on the nearest edge of its facet.
+    hits = ball.closest(drawn)
+    corners = ball.V[ball.F[hits.face]]
+    way = np.roll(corners, -1, axis=-2) - corners
+    gap = hits.position[..., None, :] - corners
+    share = np.clip((gap * way).sum(-1) / (way * way).sum(-1), 0.05, 0.95)
+    foot = corners + share[..., None] * way
+    near = np.linalg.norm(foot - hits.position[..., None, :], axis=-1).argmin(axis=-1)
+    on_edges = np.take_along_axis(foot, near[..., None, None], axis=2)[:, :, 0]
+    found = invert(charts, on_edges)
+    assert found.complete.all()
+    again = charts.lift(found.coordinates)
+    assert np.linalg.norm(again.position - on_edges, axis=-1).max() < 0.03
+    # Points of facets are led to all the way.
+    exact = strip_inverse.found(charts, drawn)
+    assert exact.rows.tolist() == [0, 1]
+    assert exact.miss.max() <= 1e-6
