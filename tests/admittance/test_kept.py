@@ -32,7 +32,7 @@ def rng():
 
 @KEPT.case
 def a_hand_that_leads():
-    found = []
+    found: list = []
     for bounds in (None, model.Bounds(40.0, 300.0, 0.3, 2.0), model.Bounds(speed=20.0)):
         state = home = model.DragState(np.zeros(3), np.eye(3), np.zeros(6))
         for k in range(60):
@@ -52,7 +52,7 @@ def a_hand_that_leads():
 
 @KEPT.case
 def forces_under_control():
-    found = []
+    found: list = []
     for stiffness, delay in ((0.5, 0.02), (3.0, 0.06), (20.0, 0.1)):
         gains = force_law.by_rule(stiffness, delay, 0.02, 1.0)
         state = force_law.LawState()
@@ -76,7 +76,7 @@ def forces_under_control():
 
 @KEPT.case
 def filters():
-    found = []
+    found: list = []
     for args in (
         (100.0, 20.0, 5.0, 0.7, 0.05),
         (30.0, 20.0, 0.2, 0.7, 0.02),
@@ -99,7 +99,7 @@ def contacts_estimated():
     depth = [0.1, 0.2, 0.35, 0.5, 0.61]
     force = [0.3, 0.45, 0.9, 1.2, 1.55]
     way = [(0.0, 0.0), (0.1, 0.0), (0.2, 0.02), (0.3, 0.5), (0.4, 1.4), (0.5, 2.0), (0.6, 2.0)]
-    found = [contact_estimation.line(depth, force)]
+    found: list = [contact_estimation.line(depth, force)]
     found.append(contact_estimation.delay_of_move(way, ((0.0, 0.0), (1.0, 2.0)), 0.02))
     for depths, forces in (
         ((0.1, 0.6), (0.3, 1.5)),
@@ -113,7 +113,7 @@ def contacts_estimated():
 
 @KEPT.case
 def swings():
-    found = []
+    found: list = []
     for grow in (0.9, 1.0, 1.1):
         one = AlternationDetector(1.0, 4, 0.5)
         told = [one.feel(0.02 * k, 2.0 * grow**k * np.sin(1.1 * k) + 5.0) for k in range(60)]
@@ -143,7 +143,7 @@ def loads_identified():
     sensed[5, 2] += 0.5
     t = 10.0 * np.arange(14.0)
     drifting = sensed + np.outer(t, [1e-3, 0, 2e-3, 0, 0, 0])
-    found = [payload_identification.condition(R), payload_identification.condition(R[:4])]
+    found: list = [payload_identification.condition(R), payload_identification.condition(R[:4])]
     for x, more in ((sensed, {}), (drifting, {"t": t})):
         one = payload_identification.identify(R, x, **more)
         found += [one, one.rms, one.largest]

@@ -106,3 +106,13 @@ def test_everything_is_left_whatever_one_of_them_raises():
         guards.leave(lambda: fail("stop", ZeroDivisionError), lambda: done.append("sensor"))
     assert done == ["stop", "sensor"]
     assert guards.leave() is None
+
+
+def test_forces_count_against_the_force_and_torques_against_the_torque_alone():
+    force, torque = np.array([0.0, 3.0, -4.0]), np.array([-0.3, 0.0, 0.4])
+    guards.check_wrench(np.concatenate([force, torque]), 5.01, 0.51)
+    guards.check_wrench(np.concatenate([0.0 * force, 20.0 * torque]), 5.0, 10.1)
+    guards.check_wrench(np.concatenate([20.0 * force, 0.0 * torque]), 101.0, 0.1)
+    for limits in ((4.99, 0.51), (5.01, 0.49)):
+        with pytest.raises(RefusedError):
+            guards.check_wrench(np.concatenate([force, torque]), *limits)

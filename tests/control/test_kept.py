@@ -43,7 +43,7 @@ def seen(bench):
 
 @KEPT.case
 def landings_and_strokes_on_springs():
-    found = []
+    found: list = []
     ways = ((0.5, 0, {}), (2.0, 2, {}), (5.0, 1, {"clamp": 8.0}), (20.0, 4, {"seek": 1.0}))
     for stiffness, cycles, policy in ways:
         for height in (-2.0, 1.0):
@@ -65,7 +65,7 @@ def landings_and_strokes_on_springs():
 
 @KEPT.case
 def surfaces_that_end_or_jump():
-    found = []
+    found: list = []
     for surface in (
         lambda t: None if 3.0 < t < 3.4 else 0.0,
         lambda t: None if t > 3.0 else 0.0,
@@ -89,7 +89,7 @@ def runs_along_a_plan():
         plan(stroke(1.5, 73.0, 0.6), 0.008, 0.5),
         plan(stroke(2.0, normal=(0, 0, 1)), start=(away, exp(np.array([0, 0.1, 0.2])) @ PEN_DOWN)),
     ]
-    found = []
+    found: list = []
     for made in plans:
         for more in ({}, {"jumps": {20: 0.05, 60: 0.03}}):
             bench = Bench(made, **more)
@@ -102,7 +102,7 @@ def runs_along_a_plan():
 
 @KEPT.case
 def runs_that_are_interrupted():
-    found = []
+    found: list = []
     made = plan(stroke(3.0))
     for cycle in (5, 60, 120, 149):
         bench = Bench(made)
@@ -122,7 +122,7 @@ def runs_that_are_interrupted():
 
 @KEPT.case
 def runs_that_press():
-    found = []
+    found: list = []
     for below in (0.0, 1.5):
         bench = Bench(plan(stroke(2.0, normal=(0, 0, 1))), presses=True)
         bench.sensor.plate = START[2] - below
@@ -133,7 +133,7 @@ def runs_that_press():
 
 @KEPT.case
 def recordings_by_a_hand():
-    found = []
+    found: list = []
     for options in ({}, {"dead_band_force": 2.0}):
         _, recorder, outcome = rehearse(**options)
         columns = recorder.log.columns()
@@ -160,7 +160,7 @@ def recordings_by_a_hand():
 
 @KEPT.case
 def numbers_that_run_along_a_plan():
-    found = []
+    found: list = []
     made = plan(stroke(1.6), start=(START + 5.0, PEN_DOWN))
     for limits in (WIDE, TIGHT):
         for at in (None, 0, 30, made.lead, 70, len(made) - 2):
@@ -182,7 +182,7 @@ def numbers_that_run_along_a_plan():
 
 @KEPT.case
 def ways_that_the_coupling_makes_itself():
-    found = []
+    found: list = []
     for goal, speed in ((3.0, 10.0), (-2.0, 50.0), (0.1, 5.0)):
         state, way = LawState(0.5, 1.0), []
         for _ in range(60):
@@ -198,7 +198,7 @@ def ways_that_the_coupling_makes_itself():
 
 @KEPT.case
 def arms_that_come_to_rest():
-    found = []
+    found: list = []
     info = ServoInfo("fake", (0.002, 0.1), 0.2)
     for rate, shake in ((3.0, 0.0), (8.0, 0.01), (8.0, 0.03)):
         rest, settled = RestWindow(0.1), SettlingDetector(info, 0.01)
@@ -218,7 +218,7 @@ def arms_that_come_to_rest():
 @KEPT.case
 def forces_that_chatter():
     t = np.arange(0.0, 8.0, 0.02)
-    found = []
+    found: list = []
     for f in (1.0, 2.0, 4.0, 9.0):
         detector = chatter.ChatterDetector(0.02)
         told = [

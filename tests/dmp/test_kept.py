@@ -187,7 +187,7 @@ def ring():
 
 @KEPT.case
 def noise_of_recordings():
-    found = [noise.estimate(named(name).position) for name in NAMES]
+    found: list = [noise.estimate(named(name).position) for name in NAMES]
     return [
         found,
         [n.along(np.eye(3)[:, :2]) for n in found[::4]],
@@ -214,7 +214,7 @@ def noise_of_uneven_axes_and_filters():
 @KEPT.case
 def axes_that_move():
     flat = named("noisy").position
-    found = []
+    found: list = []
     for scale in ([1, 1, 1], [1, 1e-4, 0], [1, 0, 0], [1, 5e-3, 5e-3]):
         x = flat * np.array(scale, dtype=float)
         found.append(moving_axes(x, noise.estimate(x)))
@@ -223,7 +223,7 @@ def axes_that_move():
 
 @KEPT.case
 def even_grids():
-    found = [time_base.even(named(name)) for name in ("uneven", "pause", "noisy", "few")]
+    found: list = [time_base.even(named(name)) for name in ("uneven", "pause", "noisy", "few")]
     t, _points = recordings.six_seconds()
     R = rotations.exp(np.column_stack([0.2 * t, 0 * t, 0.1 * t]))
     rng = random()
@@ -242,7 +242,7 @@ def even_grids():
 
 @KEPT.case
 def parts_of_recordings():
-    found = []
+    found: list = []
     for name in NAMES:
         base = time_base.even(named(name)).stroke
         for x in (base.position, recordings.noisy(base.position, 0.1, 2)):
@@ -265,7 +265,7 @@ def parts_of_recordings():
 
 @KEPT.case
 def pauses_of_many_lengths():
-    found = []
+    found: list = []
     _, points = recordings.six_seconds()
     for rest in (0.15, 0.25, 0.35, 0.5, 1.0):
         for sigma in (0.0, 0.02, 0.1, 0.3):
@@ -292,7 +292,7 @@ def pauses_left_out():
 
 @KEPT.case
 def idle_ends():
-    found = []
+    found: list = []
     for name in ("idle", "pause", "hesitation", "noisy", "loops"):
         s = named(name)
         part = segmentation.moving_part(s, noise.estimate(s.position))
@@ -321,7 +321,7 @@ def recordings_made_smooth_as_asked():
 
 @KEPT.case
 def splines_through_noise():
-    found = []
+    found: list = []
     _t, points = recordings.six_seconds()
     for x in (
         points,
@@ -341,7 +341,7 @@ def splines_through_noise():
 
 @KEPT.case
 def ends_of_splines():
-    found = []
+    found: list = []
     x = recordings.noisy(recordings.six_seconds()[1], 0.1, 8)
     for intervals in (10, 40):
         design = least_squares.uniform(len(x), intervals)
@@ -395,7 +395,7 @@ def recordings_learned():
 
 @KEPT.case
 def recordings_learned_on_surfaces():
-    found = []
+    found: list = []
     position = cases.wave(cases.U6, 109.0, 40.0)
     a = position[:, 0] / 60.0
     w = 4.0 * cases.jerk((cases.T6 - 2.0) / 1.0) * cases.jerk((5.0 - cases.T6) / 1.0)
@@ -419,7 +419,7 @@ def closed_strokes_learned():
 
 @KEPT.case
 def several_learned():
-    found = []
+    found: list = []
     three = [stroke_of(cases.timing(n)) for n in ("even", "slow_start", "hesitation")]
     three[1] = replace(three[1], position=three[1].position * [1.02, 0.95, 1.0])
     for how in ("path", "time", "none"):
@@ -432,7 +432,7 @@ def several_learned():
 
 @KEPT.case
 def several_aligned():
-    found = []
+    found: list = []
     for shape in HUMAN:
         paths = []
         for s in human_strokes.strokes(shape)[:4]:
@@ -522,7 +522,7 @@ def places_that_correspond():
 
 @KEPT.case
 def planes_of_strokes():
-    found = []
+    found: list = []
     tools = (
         None,
         np.array([0.0, 0.0, 1.0]),
@@ -547,7 +547,7 @@ def planes_of_strokes():
 
 @KEPT.case
 def strokes_in_their_charts():
-    found = []
+    found: list = []
     for name in ("aslant", "pen lift", "in plate", "bow", "nearly closed"):
         strokes, plane, closed = taught_strokes.taught_strokes(
             [preprocess(named(name))], FitOptions(), None
@@ -560,7 +560,7 @@ def strokes_in_their_charts():
 
 @KEPT.case
 def skills_recalled():
-    found = []
+    found: list = []
     for name in ("noisy", "seam", "hesitation"):
         seen = preprocess(named(name))
         [taught], _, _ = taught_strokes.taught_strokes([seen], FitOptions(), None)
@@ -627,7 +627,7 @@ def strokes_drawn_without_a_surface():
 
 @KEPT.case
 def strokes_drawn_on_round_parts():
-    found = []
+    found: list = []
     for surface in (DRUM, BALL):
         start, goal = surface.closest(START).position, surface.closest(GOAL).position
         for style in (*STYLES[:3], STYLES[6], STYLES[7], STYLES[4]):
@@ -637,7 +637,7 @@ def strokes_drawn_on_round_parts():
 
 @KEPT.case
 def rings_drawn():
-    found = []
+    found: list = []
     for style in ({}, {"size": 2.0}, {"turn": 1.0}, {"size": 0.5, "turn": -2.0}):
         found.append(drawn(ring(), Pairs(START, START), PLATE, **style))
         found.append(drawn(ring(), Pairs(START, START), None, **style))
@@ -649,7 +649,7 @@ def rings_drawn():
 @KEPT.case
 def poses_and_curves():
     skill = paper(True)
-    found = []
+    found: list = []
     for surface in (PLATE, None, DRUM):
         pairs = (
             TURNED
@@ -669,7 +669,7 @@ def poses_and_curves():
 @KEPT.case
 def copies_side_by_side():
     pairs = copies.copied(PAIRS, 3, 8.0)
-    found = [copies.ends(paper(), pairs, s, 0.0) for s in (PLATE, None)]
+    found: list = [copies.ends(paper(), pairs, s, 0.0) for s in (PLATE, None)]
     return [
         pairs.shift,
         found,
@@ -697,7 +697,7 @@ def what_is_feasible():
     )
     pairs, duration = Pairs(starts, goals), np.full(8, 6.0)
     duration[6], duration[7] = 0.3, 1e6
-    found = []
+    found: list = []
     for s in (skill, ring(), paper(True, model="original"), learned("nearly closed")):
         for surface in (PLATE, None, BALL):
             style = GeneralizeOptions(ease_in=0.4, ease_out=0.4, allow_stretch=surface is BALL)
@@ -713,7 +713,7 @@ def what_is_feasible():
 def sides_of_a_surface():
     guessed = learned("hesitation")
     under = Plane(np.zeros(3), np.array([0.0, 0.6, -0.8]))
-    found = []
+    found: list = []
     for surface in (PLATE, under, BALL, DRUM):
         found += [
             sides.turned_over(guessed, PAIRS, surface),
@@ -753,7 +753,7 @@ def paces():
         cases.CORNERS[np.minimum((30 * u).astype(int), 30)] * 1.0,
         np.column_stack([50 * np.cos(5 * u), 50 * np.sin(5 * u), 4 * u]),
     )
-    found = [
+    found: list = [
         tool_speed.passed(t, p, Pace(v, a), 25.0)
         for p in paths[::2]
         for v, a in ((30.0, 1000.0), (150.0, 400.0), (400.0, 3000.0))
@@ -763,7 +763,7 @@ def paces():
 
 @KEPT.case
 def functions_and_searches():
-    found = []
+    found: list = []
     for count, rule in ((1, "spacing"), (7, "spacing"), (40, "power"), (300, "spacing")):
         basis = even_in_time(count, 6.0, 3.0, 1.2, rule)
         s = np.linspace(1.0, 0.1, 50)
@@ -795,7 +795,7 @@ def forces_learned_and_drawn():
     from tests.dmp.test_force_profile import learned as pressed
     from tests.dmp.test_force_profile import pressed_stroke
 
-    found = []
+    found: list = []
     for lift in (None, lambda t: 5.0 + 0 * t):
         skill = pressed(pressed_stroke(noise=0.05, samples=401, lift=lift))
         heights = contact_heights.contact_heights(skill, None)
@@ -811,7 +811,7 @@ def forces_learned_and_drawn():
 
 @KEPT.case
 def springs_and_their_answers():
-    found = []
+    found: list = []
     for k, d, tau in (([100.0, 100.0], [20.0, 20.0], 2.0), ([50.0, 300.0], [20.0, 8.0], 0.7)):
         spring = transformation_system.TransformationGains(np.array(k), np.array(d), tau)
         t = np.array([0.0, 0.1, 0.35, 0.9, 2.0])
@@ -847,7 +847,7 @@ def springs_and_their_answers():
 
 @KEPT.case
 def weights_by_regression():
-    found = []
+    found: list = []
     for count in (5, 30, 90):
         basis = even_in_time(count, 6.0, 3.0, 1.0)
         s = np.exp(-np.linspace(0.0, 6.0, 400) / 3.0)
@@ -874,7 +874,7 @@ def weights_by_regression():
 
 @KEPT.case
 def splines_by_least_squares():
-    found = []
+    found: list = []
     x = np.cumsum(random().normal(size=(900, 2)), axis=0)
     for design in (
         least_squares.uniform(300, 20),
@@ -905,7 +905,7 @@ def laws_of_time():
         arc_length.monotone(t, 50.0 * (t / 4.0) ** p, 12.5 * p * (t / 4.0) ** (p - 1))
         for p in (1.0, 1.4, 2.0)
     ]
-    found = [laws, [law.time(np.linspace(-1.0, 51.0, 30)) for law in laws]]
+    found: list = [laws, [law.time(np.linspace(-1.0, 51.0, 30)) for law in laws]]
     found += [law.place(np.linspace(0.0, 4.0, 30)) for law in laws]
     bent = Correspondence().pinned({0.3: 0.4, 0.7: 0.75})
     found.append(common_timing.mean_law(laws, [Correspondence(), bent, Correspondence()], 60))
@@ -928,7 +928,7 @@ def parts_between_others():
     stroke = np.linspace(0.0, 10.0, 301)
     x = np.column_stack([30.0 * stroke, 10 * np.sin(stroke), 0 * stroke])
     outside = (np.sin(2.0 * stroke) > 0.7) | ((stroke > 7.0) & (stroke < 7.1))
-    found = []
+    found: list = []
     for least in (0.0, 20.0, 60.0):
         spans = pieces.inside(stroke, x, outside, least)
         path = pieces.Path(stroke, x)
@@ -940,7 +940,7 @@ def parts_between_others():
 
 @KEPT.case
 def demonstrations_prepared_as_the_paper_has_it():
-    found = []
+    found: list = []
     for name in ("idle", "noisy", "aslant", "nearly closed"):
         for options in ({}, {"basis": 20}, {"cutoff": 3.0, "trim": False}):
             p = paper_preprocessing.prepare(named(name), FitOptions(learning="paper", **options))
@@ -1007,7 +1007,7 @@ def forces_of_springs():
     from dmpcli.dmp.force_profile import unsprung
 
     force = np.concatenate([np.linspace(-1.0, 6.0, 80), np.linspace(6.0, 0.0, 40)])
-    found = [unsprung(-force / k + lift, force) for k in (0.5, 2.0) for lift in (0.0, 4.0)]
+    found: list = [unsprung(-force / k + lift, force) for k in (0.5, 2.0) for lift in (0.0, 4.0)]
     quality = basis_search.Quality(0.1, 0.4, 0.2, (50.0, 49.0), 0.01)
     found += [
         learning.with_lost(quality, lost) for lost in ([], [(0.2, 0.1)], [(0.0, 0.9), (0.3, 0)])
@@ -1026,7 +1026,7 @@ def forces_of_springs():
 
 @KEPT.case
 def what_is_meant_where_nothing_is_said():
-    found = [
+    found: list = [
         FitOptions(),
         GeneralizeOptions(),
         Pace(1.0),

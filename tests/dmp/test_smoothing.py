@@ -83,3 +83,14 @@ def test_idle_ends_are_outside_the_moving_part_but_for_a_margin():
     assert part.stop == pytest.approx(800 + 30, abs=3)
     assert moving_part(t, np.zeros((1000, 3))) == slice(0, 1000)
     assert moving_part(t, np.stack([5 * t, 0 * t, 0 * t], axis=1)) == slice(0, 1000)
+
+
+def test_forces_come_along_to_an_even_grid():
+    t = np.linspace(0.0, 2.0, 81)
+    t[1:-1] += 1e-3 * np.sin(np.arange(79.0))
+    force = np.column_stack([3.0 * t, 1.0 - t, 0.0 * t])
+    stroke = Trajectory(t, np.column_stack([50.0 * t, 0 * t, 0 * t]), contact_force=force)
+    found = evenly_sampled(stroke)
+    assert found.t == pytest.approx(np.linspace(0.0, 2.0, 81))
+    expected = np.column_stack([3.0 * found.t, 1.0 - found.t, 0.0 * found.t])
+    assert found.contact_force == pytest.approx(expected, abs=1e-12)

@@ -36,7 +36,7 @@ def strokes():
 
 @KEPT.case
 def waves():
-    found = []
+    found: list = []
     for x in strokes():
         for more in ({}, {"prominence": 0.3}, {"length": 300.0}):
             one = wave_height.wave_heights(x[:, 1], **more)
@@ -51,7 +51,7 @@ def waves():
 @KEPT.case
 def waves_of_many():
     v = strokes()[..., 1]
-    found = []
+    found: list = []
     for closed in (False, True):
         many = wave_height.many_waves(v, np.full(len(v), 300.0), np.full(len(v), closed))
         found += [many, many.ends, many.heights, many.mean, many.spread]
@@ -62,7 +62,7 @@ def waves_of_many():
 @KEPT.case
 def motions():
     x = strokes().transpose(2, 0, 1)
-    found = [motion.motions(T**1.2, x, x[:, :, 0].T + 0.1, x[:, :, -1].T - 0.2)]
+    found: list = [motion.motions(T**1.2, x, x[:, :, 0].T + 0.1, x[:, :, -1].T - 0.2)]
     for cutoff in (4.0, 10.0, 30.0):
         found.append(motion.log_dimensionless_jerk(T, x, cutoff))
         found.append(motion.spectral_arc_length(T, x, cutoff))
@@ -80,7 +80,7 @@ def motions():
 
 @KEPT.case
 def deviations():
-    found = []
+    found: list = []
     x = strokes()
     for other in (x[4], x[1], x[6]):
         found.append([deviation.nearest_distance(one, other) for one in x])
@@ -95,7 +95,7 @@ def deviations():
 def strokes_over_surfaces():
     ball = Sphere(np.array([0.0, 0.0, -150.0]), 150.0)
     plate = Plane(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.6, 0.8]))
-    found = []
+    found: list = []
     R = rotations.from_euler(np.column_stack([np.pi + 0.1 * U, 0.2 * U, U]))
     for surface in (ball, plate):
 
@@ -127,7 +127,7 @@ def errors_of_poses():
     a = Trajectory(0.02 * np.arange(120), position, rotation)
     R = rotations.exp(np.array([0.1, 0.2, -0.4]))
     b = Trajectory(a.t + 0.003, 1.1 * position @ R.T + rng.normal(0, 0.2, (120, 3)), R @ rotation)
-    found = [pose_error.absolute(a, b), pose_error.relative(a, b)]
+    found: list = [pose_error.absolute(a, b), pose_error.relative(a, b)]
     for scaled in (False, True):
         fit = pose_error.alignment(a.position, b.position, scaled)
         found += [

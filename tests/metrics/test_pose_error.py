@@ -126,3 +126,12 @@ def test_evo_finds_the_same_errors(aligned, rates):
             assert values == pytest.approx(judged.error, abs=1e-6)
             for name, value in judged.get_all_statistics().items():
                 assert pose_error.summary(values)[name] == pytest.approx(value, abs=1e-6)
+
+
+def test_without_orientations_steps_are_compared_in_base_axes_one_by_one():
+    here = curve(turned=False)
+    there = Trajectory(here.t, here.position * [1.0, 1.0, 3.0] + 7.0)
+    steps = 2.0 * np.diff(here.position[:, 2])
+    found = relative(here, there)
+    assert found.rotation is None
+    assert found.position == pytest.approx(np.abs(steps))

@@ -42,7 +42,7 @@ def poses():
 
 @KEPT.case
 def plans_of_strokes():
-    found = []
+    found: list = []
     for source in strokes():
         for period, speed in ((0.02, 1.0), (0.008, 0.5), (0.05, 0.25)):
             for start in poses():
@@ -63,7 +63,7 @@ def plans_of_strokes():
 
 @KEPT.case
 def straight_ways():
-    found = [plan.gap(a, b) for a in poses() for b in poses()]
+    found: list = [plan.gap(a, b) for a in poses() for b in poses()]
     for limits in (WIDE, TIGHT):
         for speed in (5.0, 60.0):
             for start in poses()[1:]:
@@ -75,7 +75,7 @@ def straight_ways():
 
 @KEPT.case
 def checks_before_the_start():
-    found = []
+    found: list = []
     for source in strokes():
         for limits in (WIDE, TIGHT):
             one = plan.make(source, 0.02, 1.0, limits, poses()[1], 25.0)
@@ -91,7 +91,7 @@ def checks_before_the_start():
 
 @KEPT.case
 def checks_of_joints():
-    found = []
+    found: list = []
     reach = Reach(models.model("ec66"))
     source = stroke(2.0, 50.0, 0.4)
     for by in ([0, 0, 0], [-450, 0, 0], [100, -80, 60]):
@@ -110,7 +110,7 @@ def ways_between_strokes():
         replace(a, position=a.position + [40.0, 90.0, 5.0]),
         replace(a, position=a.position[::-1].copy() + [0.0, -60.0, 0.0], normal=None),
     ]
-    found = []
+    found: list = []
     ways = (
         transfers.TransferOptions(20.0, 100.0, 50.0, 20.0),
         transfers.TransferOptions(8.0, 60.0, 30.0, 10.0, 4, 0.1),
@@ -132,7 +132,7 @@ def ways_between_strokes():
 
 @KEPT.case
 def ramps_and_splines():
-    found = [[deceleration.progress(t, 0.7) for t in (0.0, 0.1, 0.4, 0.9)]]
+    found: list = [[deceleration.progress(t, 0.7) for t in (0.0, 0.1, 0.4, 0.9)]]
     found.append(
         [
             deceleration.duration(v, a, 2250.0, j)
@@ -154,7 +154,7 @@ def ramps_and_splines():
 @KEPT.case
 def what_no_plan_is_made_of():
     a = stroke(2.0, 50.0, 0.3, normal=UP)
-    found = []
+    found: list = []
     for change in ({"t": a.t * 1e5}, {"normal": None}, {"rotation": None}, {"force": a.t}):
         for start in poses()[:2]:
             try:

@@ -116,7 +116,7 @@ def wavy(charts, wide=8.0, height=0.0, samples=40):
 
 @KEPT.case
 def what_meshes_say_of_themselves():
-    found = []
+    found: list = []
     for mesh in meshes().values():
         found += [
             mesh.parts,
@@ -142,7 +142,7 @@ def what_meshes_say_of_themselves():
 
 @KEPT.case
 def nearest_points():
-    found = []
+    found: list = []
     for mesh in meshes().values():
         points = about(mesh)
         at = mesh.closest(points)
@@ -161,7 +161,7 @@ def nearest_points():
 
 @KEPT.case
 def geodesics_walked_and_found():
-    found = []
+    found: list = []
     for surface in [*EXACT.values(), *meshes().values()]:
         start, goal = pairs(surface)
         link = surface.connect(start, goal)
@@ -173,7 +173,7 @@ def geodesics_walked_and_found():
 
 @KEPT.case
 def lines_searched_for_over_all_headings():
-    found = []
+    found: list = []
     for name in ("saddle", "ball", "folded", "holed", "ring"):
         mesh = meshes()[name]
         points = mesh.closest(about(mesh, 16, 1.0)).position
@@ -183,7 +183,7 @@ def lines_searched_for_over_all_headings():
 
 @KEPT.case
 def strokes_laid_on_surfaces():
-    found = []
+    found: list = []
     for surface in [*EXACT.values(), *meshes().values()]:
         for wide, height, half in ((8.0, 0.0, 20.0), (20.0, 3.0, 30.0)):
             start, goal = pairs(surface, 3, half)
@@ -204,7 +204,7 @@ def strokes_laid_on_surfaces():
 
 @KEPT.case
 def strokes_laid_on_machined_parts():
-    found = []
+    found: list = []
     for name in ("angle_block", "carriage", "bracket"):
         mesh = part(name)
         r = rng()
@@ -234,7 +234,7 @@ def strokes_laid_on_machined_parts():
 
 @KEPT.case
 def closed_strokes_laid_on_surfaces():
-    found = []
+    found: list = []
     c = np.linspace(0.0, 2.0 * np.pi, 40)
     for surface in [*EXACT.values(), meshes()["saddle"], meshes()["ball"]]:
         start, _ = pairs(surface, 4)
@@ -246,21 +246,27 @@ def closed_strokes_laid_on_surfaces():
     return found
 
 
+def seen(charts, position):
+    """What an inversion finds, but for how far it is off: that is rounding."""
+    found = invert(charts, position)
+    return [found.coordinates, found.axes, found.reached, found.status]
+
+
 @KEPT.case
 def charts_inverted():
-    found = []
+    found: list = []
     for surface in [*EXACT.values(), meshes()["saddle"], meshes()["bumpy"], meshes()["ball"]]:
         charts = surface.charts(*pairs(surface, 3))
         for height in (0.0, 3.0):
             drawn = charts.lift(wavy(charts, 10.0, height)).position
-            found.append(invert(charts, drawn))
-        found.append(invert(charts, drawn + 0.3 * rng().normal(size=drawn.shape)))
+            found.append(seen(charts, drawn))
+        found.append(seen(charts, drawn + 0.3 * rng().normal(size=drawn.shape)))
     return found
 
 
 @KEPT.case
 def regions_within_lines():
-    found = []
+    found: list = []
     c = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
     outline = np.column_stack([14 * np.cos(c) + 4 * np.cos(3 * c), 12 * np.sin(c), 80 + 0 * c])
     for surface in [*EXACT.values(), meshes()["saddle"], meshes()["bumpy"], meshes()["ball"]]:
@@ -278,7 +284,7 @@ def regions_within_lines():
 
 @KEPT.case
 def margins_to_borders():
-    found = []
+    found: list = []
     for name in ("saddle", "holed", "ring", "cone"):
         mesh = meshes()[name]
         points = mesh.closest(about(mesh, 80, 0.5)).position[None]
@@ -315,7 +321,7 @@ def meshes_mended():
         ),
         "border edge": tjunction(V, F),
     }
-    found = []
+    found: list = []
     for V_, F_ in many.values():
         one = mesh_repair.mended(V_, F_)
         found += [
@@ -348,7 +354,7 @@ def polygons_cut():
         for k in range(10)
     ]
     crossed = [[0, 0], [10, 10], [10, 0], [0, 10], [-5, 5]]
-    found = []
+    found: list = []
     for outlines in ([U], [star, U], [crossed], [U[:4]], [star[::2]]):
         flat = np.concatenate([np.asarray(o, dtype=float) for o in outlines])
         V = np.column_stack([flat, 0.05 * np.abs(flat[:, 0]) ** 1.5 * (len(outlines) > 1)])
@@ -371,7 +377,7 @@ def touched(mesh, count, seed=5, sigma=0.05):
 
 @KEPT.case
 def parts_laid_to_touched_points():
-    found = []
+    found: list = []
     R, t = rotations.exp(np.array([0.2, -0.4, 0.7])), np.array([120.0, -30.0, 15.0])
     for name in ("angle_block", "bracket"):
         mesh = part(name)
@@ -391,7 +397,7 @@ def parts_laid_to_touched_points():
 
 @KEPT.case
 def pairs_laid_upon_each_other():
-    found = []
+    found: list = []
     r = rng()
     R, t = rotations.exp(np.array([1.0, -0.4, 0.7])), np.array([20.0, -30.0, 15.0])
     for shape in (np.ones(3), np.array([1.0, 1.0, 0.0]), np.array([1.0, 0.2, 0.05])):
@@ -410,7 +416,7 @@ def pairs_laid_upon_each_other():
 
 @KEPT.case
 def bounds_of_poses():
-    found = [
+    found: list = [
         [f(s, n) for s in (0.0, 0.5, 4.0) for n in (1, 3, 12)]
         for f in (pose_bound.variance, pose_bound.likely_rise, pose_bound.sure_rise)
     ]
@@ -490,7 +496,7 @@ def right(count=60):
 def strokes_that_are_wrong():
     mesh, feet = right()
     start, step = np.array([[-30.0, 1.0, 0.0]]), np.array([[60.0, 0.0, 0.0]])
-    found = []
+    found: list = []
     for off in (0.0, 0.05, 0.5, 1.2, 3.0):
         for axis in range(3):
             for part_ in (slice(0, 1), slice(20, 40), slice(59, 60)):
@@ -529,7 +535,7 @@ def poses_sought():
         rotations.exp(np.array([0.02, 0.03, -0.01])), np.ones(3), points.mean(axis=0), 6, 2.0, 0.1
     )
     best, squares = pose_search.descend(points, on_part, starts)
-    found = [
+    found: list = [
         pose_search.signed(10.0 * rng().normal(size=(20, 3)), closest),
         best.rotation,
         best.position,
@@ -559,7 +565,7 @@ def goals_behind_walls():
     x = np.linspace(-25.0, 25.0, 12)
     origin = np.tile([-20.0, 3.0, 0.6], (12, 1))
     goal = np.column_stack([x, 0.2 * x, 0.6 * np.where(np.arange(12) % 3, -1.0, 1.0)])
-    found = [
+    found: list = [
         mistaken(wall, origin, goal, np.full(12, off), np.full(12, size))
         for off in (0.0, 0.25, 0.35, 1.0)
         for size in (20.0, 50.0, 90.0)
@@ -569,7 +575,7 @@ def goals_behind_walls():
 
 @KEPT.case
 def lines_shot():
-    found = []
+    found: list = []
     for name in ("saddle", "bumpy", "ball", "folded"):
         mesh = meshes()[name]
         start, goal = pairs(mesh, 4, 15.0)

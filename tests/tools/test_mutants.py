@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.mutants import choice, operators, reach
+from tools.mutants import choice, operators, reach, warm
 
 ROOT = Path(__file__).parents[2]
 
@@ -78,10 +78,37 @@ def test_what_is_loaded_at_once_is_judged_by_the_tests_that_use_it(tmp_path, mon
     assert choice.stages(of[6], known, 0.25) == [[a]]
 
 
+def test_kept_results_judge_first_with_half_of_what_a_mutant_is_worth():
+    file = "p/room/a.py"
+    [mutant] = [
+        m for m in operators.mutants(file, "def f(x):\n    return -x\n") if m.after[-2:] == " x"
+    ]
+    kept = [f"tests/room/test_kept.py::{n}" for n in "abc"]
+    a = "tests/room/test_a.py::a"
+    seconds = dict(zip([*kept, a], (0.3, 0.4, 0.5, 0.2), strict=True))
+    known = reach.Reach(seconds, {file: {2: set(seconds)}}, [])
+    assert choice.stages(mutant, known, 1.6) == [kept[:2], [a]]
+
+
 def test_nothing_of_the_repository_may_be_loaded_before_a_mutant():
     """These tests are, here."""
     with pytest.raises(RuntimeError, match="loaded before any mutant: tests"):
         reach.load([])
+
+
+def test_a_changed_function_is_put_in_place_in_every_name_that_holds_it(monkeypatch):
+    text = "def f(x):\n    return x + 1\n\n\ndef g(x):\n    return x\n"
+    held = {}
+    exec(compile(text, "f.py", "exec"), held)
+    known = {warm._key(held[name].__code__): [held[name]] for name in "fg"}
+    monkeypatch.setattr(warm, "_functions", known)
+    taken = [held["f"]]
+    [mutant] = [m for m in operators.mutants("f.py", text) if m.after == "return x - 1"]
+    assert warm.put(compile(mutant.placed(), "f.py", "exec"))
+    assert taken[0](3) == 2
+    assert held["g"](3) == 3
+    # What changes nothing that is loaded has to be tried elsewhere.
+    assert not warm.put(compile("A = 4", "f.py", "exec"))
 
 
 MODULE = '''
