@@ -30,7 +30,7 @@ TITLES = {
 }
 _ONE = {"wave_height": "wave", "nearest_max": "deviation", "surface_distance_max": "off surface"}
 
-_WIDTH, _HEIGHT, _ACROSS, _UP = 2.6, 1.35, 0.75, 0.6
+_WIDTH, _HEIGHT, _ACROSS, _UP = 2.6, 1.35, 0.85, 0.6
 _TOP, _RIGHT = 0.3, 0.2
 _CELL, _CELL_GAP = 1.85, 0.45
 

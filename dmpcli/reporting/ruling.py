@@ -38,7 +38,8 @@ def rule(figure: Figure) -> None:
     """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
-            if axis.get_visible():
+            # One with its numbers on the other side, of a colour bar, stays matplotlib's.
+            if axis.get_visible() and axis.get_ticks_position() not in ("right", "top"):
                 _rule(figure, axes, axis)
                 axis.set_visible(False)
 

@@ -13,7 +13,7 @@ from dmpcli.reporting import drawing
 from dmpcli.reporting.style import STYLES
 
 _WIDE, _BESIDE, _HEIGHT = 3.7, 2.2, 1.05
-_LEFT, _RIGHT, _GAP, _ASIDE, _TOP, _BOTTOM = 0.75, 0.2, 0.2, 0.75, 0.45, 0.5
+_LEFT, _RIGHT, _GAP, _ASIDE, _TOP, _BOTTOM = 0.88, 0.2, 0.2, 0.85, 0.45, 0.5
 _LENGTHS = ("u", "v", "w")
 _ANGLES = (("about u", "-"), ("about v", "--"), ("about w", ":"))
 _LEAST_LENGTH, _LEAST_ANGLE = 1e-3, 1e-3
