@@ -1,5 +1,7 @@
 """How well and how fast strokes are carried onto meshes. ``python -m benchmarks.surfaces``.
 
+With ``kernels`` behind it the table of accuracy alone, by compiled kernels.
+
 Meshes of a cylinder (R 60), a sphere (R 150), the saddle z = (x² - y²)/240 and a bumpy field,
 z = 3.315 Σ_i sin(k_i·(x, y) + i) with k_0 = 2π/80 (0.95, 0.3122), k_1 = 2π/62 (-0.4, 0.9165), whose
 smallest radius of curvature is 29.0 mm; sine strokes of 109 mm and 49.98 mm wave height in 32
@@ -7,6 +9,7 @@ headings, 500 samples each. The truth is a closed form or a Runge-Kutta geodesic
 """
 
 import multiprocessing
+import sys
 import time
 
 import numpy as np
@@ -39,13 +42,14 @@ def wave_heights(case: cases.Case, lift: ChartImage) -> Floats:
     return np.abs(np.diff(v[:, turns], axis=1))
 
 
-def accuracy() -> None:
+def accuracy(compiled: bool = False) -> None:
     """Print a Markdown table."""
     print(HEADER)
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for name in cases.SURFACES:
         for faces in FACES:
             mesh = cases.mesh(name, faces)
+            mesh = mesh.with_kernels if compiled else mesh
             error = cases.largest_error(name, mesh)
             for periods in (1, 2):
                 case = cases.case(name, 32, 500, periods)
@@ -56,7 +60,7 @@ def accuracy() -> None:
                 goal = mesh.closest(case.goal).position
                 end = np.linalg.norm(lift.position[:, -1] - goal, axis=1).max()
                 on = mesh.closest(lift.position).distance.max()
-                smooth = frame_smoothing.smoothed(lift.axes, lift.position)
+                smooth = frame_smoothing.smoothed(lift.axes, lift.position, compiled=compiled)
                 turn = [cases.turns(axes).max() for axes in (case.axes, lift.axes, smooth)]
                 print(
                     f"| {name} | {faces} | {periods} | {error:.4f} | {off:.4f} "
@@ -129,5 +133,7 @@ def throughput() -> None:
 
 
 if __name__ == "__main__":
-    accuracy()
-    throughput()
+    by_kernels = "kernels" in sys.argv[1:]
+    accuracy(by_kernels)
+    if not by_kernels:
+        throughput()

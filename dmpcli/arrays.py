@@ -10,6 +10,10 @@ Floats: TypeAlias = NDArray[np.float64]
 """Double-precision array; docstrings give the shape."""
 
 Integers: TypeAlias = NDArray[np.int64]
+Singles: TypeAlias = NDArray[np.float32]
+Halves: TypeAlias = NDArray[np.int32]
+"""Arrays of half the size, where kernels read much of them."""
+
 Booleans: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 

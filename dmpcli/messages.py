@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from dmpcli.errors import DmpError, InputError, printable
 
@@ -253,31 +253,62 @@ def tell_as(level: int, message: str) -> None:
     LOG.log(level, "%s", message)
 
 
+class Advance(Protocol):
+    """Told how much is done."""
+
+    def __call__(self, steps: int, failed: int = 0) -> None:
+        """So many steps since the last call, of which so many failed."""
+
+
+def _unseen(steps: int, failed: int = 0) -> None:
+    """Nobody looks on."""
+
+
 @contextlib.contextmanager
-def progress(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on the command line's terminal; elsewhere, or when quiet, nothing.
+def progress(label: str, total: int) -> Iterator[Advance]:
+    """Show on the command line's terminal how far something is; elsewhere, or when quiet, nothing.
+
+    Shown are the share done, the count, how many a second, failures, and the time that is left.
 
     Yields
     ------
-    callable
-        Takes the number of steps done since the last call.
+    Advance
     """
     if not watched():
-        yield lambda _: None
+        yield _unseen
         return
     from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
         Progress,
+        TaskProgressColumn,
         TextColumn,
         TimeRemainingColumn,
     )
 
-    columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn(label),
+        BarColumn(),
+        TaskProgressColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("[red]{task.fields[failures]}"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda steps: bar.advance(task, steps)
+        task = bar.add_task(label, total=total, rate="", failures="")
+        failures = 0
+
+        def advance(steps: int, failed: int = 0) -> None:
+            nonlocal failures
+            failures += failed
+            speed = bar.tasks[0].speed
+            rate = "" if speed is None else f"{speed:,.3g}/s" if speed < 1e3 else f"{speed:,.0f}/s"
+            said = f"{failures} failed" if failures else ""
+            bar.update(task, advance=steps, rate=rate, failures=said)
+
+        yield advance
 
 
 def watched() -> bool:

@@ -13,8 +13,10 @@ from hypothesis import settings
 settings.register_profile("dmpcli", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("dmpcli")
 
-FIRST = ("tests/pipeline", "tests/tools")
-"""These wait more than they work: begun last, they would leave the other cores idle at the end."""
+FIRST = tuple(
+    f"tests/{part}" for part in ("pipeline", "tools", "faults", "docs", "commands", "surfaces")
+)
+"""What waits or takes long in one file: begun last, it would leave other cores idle at the end."""
 
 
 def pytest_collection_modifyitems(items):

@@ -14,6 +14,7 @@ MODULES = {
     "ros": "rosbags",
     "bench": "mujoco",
     "view": "k3d",
+    "fast": "numba",
 }
 
 

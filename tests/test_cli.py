@@ -64,6 +64,20 @@ def test_a_wrong_command_is_exit_code_2_on_standard_error():
     assert done.stdout == ""
 
 
+def test_a_command_that_is_called_again_has_its_own_words_and_wants_its_files(tmp_path):
+    """Its options are made once in a process."""
+    log = str(tmp_path / "log")
+    for words in (["--print-config"], ["--print-config", "--basis", "77"]):
+        done = CliRunner().invoke(cli.app, ["fit", *words, "--log", log])
+        assert done.exit_code == 0
+        assert ("77" in done.stdout) == ("77" in words)
+    first, second = Path(log).read_text().splitlines()[::2]
+    assert "--basis" not in first
+    assert "fit --print-config --basis 77 --log" in second
+    assert CliRunner().invoke(cli.app, ["fit"]).exit_code == 2
+    assert CliRunner().invoke(cli.app, ["fit", "--print-config"]).exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("error", "code"), [(DmpError, 2), (InputError, 2), (RefusedError, 3), (InstrumentError, 4)]
 )

@@ -15,6 +15,7 @@ edge or a knock.
 """
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -32,6 +33,8 @@ _TILT, _FRICTION, _FRICTION_KNOWN = 0.1, 0.2, 0.15
 _TILTS, _RUBS = 0.05, 0.02
 _FAR = 3.0
 _MOST_FRICTION = 1.0
+
+_Vector: TypeAlias = tuple[float, float, float]
 
 
 class NormalEstimator:
@@ -53,24 +56,28 @@ class NormalEstimator:
     """
 
     def __init__(self, period: float, friction: float = _FRICTION) -> None:
-        self._x = np.array([0.0, 0.0, friction])
-        self._P = np.diag([_TILT**2, _TILT**2, _FRICTION_KNOWN**2])
-        self._Q = np.diag([_TILTS**2, _TILTS**2, _RUBS**2]) * period
-        self._first: Floats | None = None
-        self._axes = np.eye(3)
+        # Scalars: this runs once a cycle, and arrays of three take ten times as long.
+        self._x = (0.0, 0.0, friction)
+        self._P = (_TILT**2, 0.0, 0.0, _TILT**2, 0.0, _FRICTION_KNOWN**2)  # its upper half
+        self._wander = (_TILTS**2 * period, _RUBS**2 * period)
+        self._first: _Vector | None = None
+        self._axes: tuple[_Vector, _Vector, _Vector] | None = None
         self.heard = 0
 
     @property
     def friction(self) -> float:
         """Coulomb's coefficient."""
-        return float(self._x[2])
+        return self._x[2]
 
     @property
     def normal(self) -> Floats:
-        """Unit normal, shape (3,), base axes; the planned one while nothing is known."""
+        """Unit normal, shape (3,), base axes; of something that has been felt or carried."""
+        if self._axes is None:
+            raise ValueError("nothing is known of where the tool is")
         a, b, _ = self._x
-        found: Floats = self._axes[2] + a * self._axes[0] + b * self._axes[1]
-        return found / math.sqrt(1.0 + a * a + b * b)
+        t1, t2, n = self._axes
+        size = math.sqrt(1.0 + a * a + b * b)
+        return np.array([(w + a * u + b * v) / size for u, v, w in zip(t1, t2, n, strict=True)])
 
     @property
     def angle(self) -> float:
@@ -85,15 +92,19 @@ class NormalEstimator:
         planned : array, shape (3,)
             Unit vector.
         """
-        if self._first is None:
-            away = np.eye(3)[int(np.argmin(np.abs(planned)))]
-            self._first = away
-        first = self._first - (self._first @ planned) * planned
-        first = first / math.sqrt(first @ first)
-        self._first = first
         x, y, z = planned.tolist()
-        u, v, w = first.tolist()
-        self._axes = np.array([[u, v, w], [y * w - z * v, z * u - x * w, x * v - y * u], planned])
+        if self._first is None:
+            sizes = (abs(x), abs(y), abs(z))
+            least = sizes.index(min(sizes))
+            self._first = (float(least == 0), float(least == 1), float(least == 2))
+        u, v, w = self._first
+        off = u * x + v * y + w * z
+        u, v, w = u - off * x, v - off * y, w - off * z
+        size = math.sqrt(u * u + v * v + w * w)
+        u, v, w = u / size, v / size, w / size
+        self._first = (u, v, w)
+        second = (y * w - z * v, z * u - x * w, x * v - y * u)
+        self._axes = (self._first, second, (x, y, z))
 
     def feel(self, force: Floats, velocity: Floats, planned: Floats) -> bool:
         """Take in one cycle.
@@ -113,32 +124,69 @@ class NormalEstimator:
             Whether it told something: the surface pushes, and the tool slides.
         """
         self.carry(planned)
-        f1, f2, push = (self._axes @ force).tolist()
-        v1, v2, rise = (self._axes @ velocity).tolist()
+        assert self._axes is not None
+        fx, fy, fz = force.tolist()
+        vx, vy, vz = velocity.tolist()
+        f1, f2, push = (fx * x + fy * y + fz * z for x, y, z in self._axes)
+        v1, v2, rise = (vx * x + vy * y + vz * z for x, y, z in self._axes)
         speed = math.hypot(v1, v2)
         if push <= 0.0 or speed < SLOWEST:
             return False
         s1, s2 = v1 / speed, v2 / speed
-        self._P = self._P + self._Q
+        p00, p01, p02, p11, p12, p22 = self._P
+        tilts, rubs = self._wander
+        self._P = (p00 + tilts, p01, p02, p11 + tilts, p12, p22 + rubs)
         by_force = (_FORCE / push) ** 2 + _ELSE**2
         by_motion = (_MOTION / speed) ** 2 + _ELSE**2
-        self._learn(np.array([1.0, 0.0, -s1]), f1 / push, by_force)
-        self._learn(np.array([0.0, 1.0, -s2]), f2 / push, by_force)
-        self._learn(np.array([s1, s2, 0.0]), -rise / speed, by_motion)
-        self._x[2] = min(max(self._x[2], 0.0), _MOST_FRICTION)
+        self._learn(1.0, 0.0, -s1, f1 / push, by_force)
+        self._learn(0.0, 1.0, -s2, f2 / push, by_force)
+        self._learn(s1, s2, 0.0, -rise / speed, by_motion)
+        a, b, mu = self._x
+        self._x = (a, b, min(max(mu, 0.0), _MOST_FRICTION))
         self.heard += 1
         return True
 
-    def _learn(self, row: Floats, value: float, variance: float) -> None:
-        """One equation, ``row @ x = value``."""
-        spread = self._P @ row
-        known = float(row @ spread)
-        off = value - float(row @ self._x)
+    def _learn(self, h0: float, h1: float, h2: float, value: float, variance: float) -> None:
+        """One equation, ``h @ x = value``."""
+        x0, x1, x2 = self._x
+        p00, p01, p02, p11, p12, p22 = self._P
+        s0 = p00 * h0 + p01 * h1 + p02 * h2
+        s1 = p01 * h0 + p11 * h1 + p12 * h2
+        s2 = p02 * h0 + p12 * h1 + p22 * h2
+        known = h0 * s0 + h1 * s1 + h2 * s2
+        off = value - (h0 * x0 + h1 * x1 + h2 * x2)
         far = abs(off) / (_FAR * math.sqrt(known + variance))
         whole = known + variance * max(far, 1.0) ** 2
-        gain = spread / whole
-        self._x = self._x + gain * off
-        self._P = self._P - gain[:, None] * spread
+        g0, g1, g2 = s0 / whole, s1 / whole, s2 / whole
+        self._x = (x0 + g0 * off, x1 + g1 * off, x2 + g2 * off)
+        self._P = (
+            p00 - g0 * s0,
+            p01 - g0 * s1,
+            p02 - g0 * s2,
+            p11 - g1 * s1,
+            p12 - g1 * s2,
+            p22 - g2 * s2,
+        )
+
+
+def carried(normal: Floats, before: Floats, planned: Floats) -> Floats:
+    """Carry a normal with the planned one to another place: it leans from it as it did.
+
+    Parameters
+    ----------
+    normal : array, shape (3,)
+        Unit vector, less than a right angle from `before`.
+    before, planned : array, shape (3,)
+        The planned unit normals, less than a right angle apart.
+    """
+    upright = float(normal @ before)
+    lean = normal - upright * before
+    across = lean - (lean @ planned) * planned
+    size = math.sqrt(across @ across)
+    if size < 1e-12:
+        return planned
+    found: Floats = upright * planned + math.sqrt(lean @ lean) / size * across
+    return found
 
 
 def turned(now: Floats, wanted: Floats, planned: Floats, most: float, step: float) -> Floats:

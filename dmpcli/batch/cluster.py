@@ -6,6 +6,8 @@ the same programs and must see the batch's folder under the same path.
 """
 
 import contextlib
+import importlib.metadata
+import importlib.util
 import platform
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
@@ -67,15 +69,25 @@ def _connected(client: Any, address: str) -> Iterator[Draw]:
         yield draw
 
 
-def versions() -> dict[str, str]:
-    """Return the versions that decide about the bytes of a part."""
-    return {
+def versions(kernels: bool = False) -> dict[str, str]:
+    """Return the versions that decide about the bytes of a part.
+
+    Parameters
+    ----------
+    kernels : bool
+        Whether it is drawn with them.
+    """
+    found = {
         "dmpcli": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
         "pyarrow": pa.__version__,
     }
+    if kernels:
+        there = importlib.util.find_spec("numba") is not None
+        found["numba"] = importlib.metadata.version("numba") if there else "not installed"
+    return found
 
 
 def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
@@ -98,7 +110,7 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
             self.limits.restore_original_limits()
             worker.__dict__.pop(self.name, None)
 
-    _check(client, address, Path(job.folder).absolute())
+    _check(client, address, Path(job.folder).absolute(), job.task.style.compiled)
     job = replace(job, folder=str(Path(job.folder).absolute()))
     name = _PLUGIN + uuid4().hex
     client.register_plugin(Bringer(name))
@@ -115,19 +127,19 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
         client.unregister_worker_plugin(name)
 
 
-def _check(client: Any, address: str, folder: Path) -> None:
+def _check(client: Any, address: str, folder: Path, kernels: bool) -> None:
     """Refuse a cluster whose workers would draw other bytes, or elsewhere."""
     if not client.ncores():
         raise InstrumentError(f"--cluster {address}: the scheduler has no workers; start some")
     try:
-        found: dict[str, dict[str, str]] = client.run(versions)
+        found: dict[str, dict[str, str]] = client.run(versions, kernels)
     except Exception as error:
         raise InputError(
             f"--cluster {address}: its workers cannot run dmpcli {__version__} ({error}); "
             "install it there"
         ) from None
     for worker, theirs in found.items():
-        for package, ours in versions().items():
+        for package, ours in versions(kernels).items():
             if theirs.get(package) != ours:
                 raise InputError(
                     f"--cluster {address}: worker {worker} has {package} {theirs.get(package)}, "

@@ -1,6 +1,6 @@
 """One batch from its table of pairs to its manifest."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -16,6 +16,7 @@ from dmpcli.dmp.copies import ends
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.time_scaling import timing
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.messages import Advance
 from dmpcli.records import manifest, trajectory
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Record
@@ -161,13 +162,11 @@ class Batch:
         """How many pairs this shard is to draw."""
         return sum(self.sizes.values())
 
-    def run(self, draw: Draw, advance: Callable[[int], None]) -> Summary:
+    def run(self, draw: Draw, advance: Advance) -> Summary:
         """Draw the whole table, as `run`."""
         return run(iter([self]), draw, advance)
 
-    def draw(
-        self, folder: Folder, draw: Draw, advance: Callable[[int], None], summary: Summary
-    ) -> None:
+    def draw(self, folder: Folder, draw: Draw, advance: Advance, summary: Summary) -> None:
         """Draw what is not there yet.
 
         Raises
@@ -181,7 +180,7 @@ class Batch:
             self._note(outcome, self.sizes[outcome.number], summary)
             if outcome.number not in kept:
                 folder.note(outcome)
-            advance(self.sizes[outcome.number])
+            advance(self.sizes[outcome.number], len(outcome.failed))
         bad = [status for status in self.table.status if status != OK]
         summary.rows += len(self.table)
         summary.bad += len(bad)
@@ -329,7 +328,7 @@ class Batch:
         ]
 
 
-def run(pieces: Iterator[Batch], draw: Draw, advance: Callable[[int], None]) -> Summary:
+def run(pieces: Iterator[Batch], draw: Draw, advance: Advance) -> Summary:
     """Draw what is not there yet; with all parts there, write table and manifest.
 
     Parameters
@@ -339,8 +338,8 @@ def run(pieces: Iterator[Batch], draw: Draw, advance: Callable[[int], None]) -> 
         for.
     draw : callable
         Of `dmpcli.batch.workers`.
-    advance : callable
-        Told how many pairs are done.
+    advance : Advance
+        Told how many pairs are done, and could not be drawn.
 
     Returns
     -------

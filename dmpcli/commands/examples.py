@@ -131,6 +131,10 @@ EXAMPLES: dict[str, tuple[Example, ...]] = {
         ),
     ),
     "inspect": (
+        Example(
+            "Where on a part a skill can be drawn.",
+            "dmpcli inspect part.stl --for skill.json",
+        ),
         Example("What a file is, and what to do with it.", "dmpcli inspect skill.json"),
         Example("The JSON Schema of a kind of file.", "dmpcli inspect --schema tool"),
     ),

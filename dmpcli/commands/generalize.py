@@ -15,8 +15,10 @@ from dmpcli.settings.generalize import GeneralizeSettings, PlaceOptions
 from dmpcli.settings.options import Given, choice, with_options
 
 if TYPE_CHECKING:
+    from dmpcli.records.pair_stream import PairStream
     from dmpcli.records.pairs import PairTable
     from dmpcli.workflows.generalize import Ready
+    from dmpcli.workflows.surface_input import SurfaceInput
 
 
 @with_options
@@ -122,6 +124,7 @@ def command(
     if surface is not None and not sites:
         store = surface_input.store_in(wanted.surface_cache)
         read = surface_input.read(surface, surface_pose, surface_unit, True, store)
+    settings = _with_means(settings, output, table, stream, read)
     inputs: list[dict[str, str]] = []
     if table is None:
         assert start is not None
@@ -168,6 +171,31 @@ def command(
         return
     batches.tell_of_unknown(table)
     batches.write(ready_of(table), output, wanted)
+
+
+def _with_means(
+    settings: GeneralizeSettings,
+    output: Path,
+    table: "PairTable | None",
+    stream: "PairStream | None",
+    read: "SurfaceInput | None",
+) -> GeneralizeSettings:
+    """Decide by what means all of the job is drawn; a stroke alone is as it always was."""
+    if table is None and settings.kernels != "compiled":
+        return settings
+    from dmpcli.surfaces.triangle_mesh import TriangleMesh
+    from dmpcli.workflows import kernels
+
+    rows = 1 if table is None else len(table) if stream is None else stream.rows
+    mesh = read is not None and isinstance(read.surface, TriangleMesh)
+    if table is not None and table.places is not None:
+        # Each surface wants its facets made ready.
+        mesh = len(table) >= kernels.MANY_ON_EACH * len(table.places.places)
+    turning = settings.orientation == "surface" or settings.inclination is not None
+    means = kernels.means(settings.kernels, rows, mesh, turning, output)
+    if means == "compiled":
+        kernels.get_ready()
+    return replace(settings, kernels=means)
 
 
 def _check_orientations(

@@ -1,5 +1,6 @@
 """``dmpcli inspect``: what a file is."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,6 +34,14 @@ def command(
             ),
         ),
     ] = None,
+    skill: Annotated[
+        Path | None,
+        typer.Option(
+            "--for",
+            metavar="FILE",
+            help="With a mesh: the skill to be drawn on it; propose places where generalize does.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     form: RecordingOptions,
 ) -> None:
@@ -48,6 +57,6 @@ def command(
         raise InputError("FILE is missing: name a file, or - for standard input")
     from dmpcli.workflows.inspect import inspect
 
-    found = inspect(file, form.as_layout(), form.as_words())
+    found = inspect(file, form.as_layout(), form.as_words(), skill)
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
     file_io.say(text)

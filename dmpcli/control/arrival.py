@@ -47,13 +47,9 @@ class ArrivalMonitor:
     def __init__(self, plan: Plan, tolerance: float, angle: float, coupled: bool = False) -> None:
         self._plan, self._tolerance, self._angle = plan, tolerance, angle
         self._normal = plan.normal_at(plan.last) if coupled else None
+        self._far = self._farthest(plan)
         positions = plan.position[plan.lead : plan.last + 1]
-        away = positions - positions[0]
-        if coupled and plan.normal is not None:
-            normals = plan.normal[plan.lead : plan.last + 1]
-            away = away - np.vecdot(away, normals)[:, None] * normals
         rotations = plan.rotation[plan.lead : plan.last + 1].reshape(len(positions), 9)
-        self._far = math.sqrt(float(np.vecdot(away, away).max()))
         self._turn = _angle(float((rotations @ rotations[0]).min()))
         self._first: RobotState | None = None
         self._latest: RobotState | None = None
@@ -73,6 +69,17 @@ class ArrivalMonitor:
     def follow(self, plan: Plan) -> None:
         """Go on with a plan whose end has moved; what was seen of the arm counts on."""
         self._plan = plan
+        self._far = self._farthest(plan)
+        self._moves = self._moves or self._far <= _STIRS
+
+    def _farthest(self, plan: Plan) -> float:
+        """How far a stroke leads away from its start, mm."""
+        positions = plan.position[plan.lead : plan.last + 1]
+        away = positions - positions[0]
+        if self._normal is not None and plan.normal is not None:
+            normals = plan.normal[plan.lead : plan.last + 1]
+            away = away - np.vecdot(away, normals)[:, None] * normals
+        return math.sqrt(float(np.vecdot(away, away).max()))
 
     def see(self, state: RobotState, index: float) -> None:
         """Look at the arm while a set-point is sent.

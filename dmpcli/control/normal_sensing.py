@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmpcli.admittance.normal_estimation import NormalEstimator, turned
+from dmpcli.admittance.normal_estimation import NormalEstimator, carried, turned
 from dmpcli.arrays import Floats
 
 # Over so many cycles the tool's own velocity is taken.
@@ -53,6 +53,7 @@ class NormalSense:
         self._estimator = NormalEstimator(period)
         self._way: deque[tuple[float, Floats]] = deque(maxlen=_WINDOW + 1)
         self._used: Floats | None = None
+        self._planned = np.zeros(3)
         self._angles: list[float] = []
         self.estimate: Floats | None = None
 
@@ -96,9 +97,13 @@ class NormalSense:
         policy = self._policy
         if not policy.used or self.estimate is None:
             return planned
-        now = planned if self._used is None else self._used
+        now = planned
+        if self._used is not None:
+            # The planned normal turns with the surface; the rate is that of the lean from it.
+            now = carried(self._used, self._planned, planned)
         step = policy.rate * self._period
         self._used = turned(now, self.estimate, planned, policy.angle, step)
+        self._planned = planned
         return self._used
 
     def facts(self) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from dmpcli.dmp.time_scaling import Timing, timing
 from dmpcli.errors import InputError
 from dmpcli.surfaces.plane import Plane, pair_charts
 from dmpcli.surfaces.surface import Charts, Status, Surface
-from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 
 def draw(
@@ -73,8 +72,10 @@ def draw_blocks(
     InputError
         The skill's own numbers overflow.
     """
-    if style.compiled and isinstance(surface, TriangleMesh):
-        surface = surface.with_kernels
+    if style.compiled:
+        from dmpcli.surfaces.mesh import Mesh
+
+        surface = surface.with_kernels if isinstance(surface, Mesh) else surface
     over = turned_over(skill, pairs, surface)
     for seconds in np.unique(duration):
         when = timing(

@@ -14,6 +14,8 @@ WidthRule = Literal["spacing", "power"]
 Align = Literal["none", "time", "path"]
 Amplitude = Literal["keep", "scale"]
 Orientation = Literal["keep", "surface"]
+Kernels = Literal["auto", "compiled", "pure"]
+Means = Literal["compiled", "pure"]
 OnBorder = Literal["fail", "clip", "skip", "split"]
 
 MOST = 2000

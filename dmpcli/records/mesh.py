@@ -148,12 +148,12 @@ def description(source: Source) -> dict[str, Any]:
         "error_median": error.median,
         "error_largest": error.largest,
         "noisy_share": Mesh(mesh.V, mesh.F).noisy_share,
-        "room": [_room(one) for one in open_patches(mesh.V, mesh.F)],
+        "room": [as_options(one) for one in open_patches(mesh.V, mesh.F)],
         "remarks": mesh.remarks,
     }
 
 
-def _room(patch: "Patch") -> str:
+def as_options(patch: "Patch") -> str:
     """Return where there is room for a stroke, as options of ``generalize`` say it."""
 
     def said(point: Floats, digits: int = 1) -> str:

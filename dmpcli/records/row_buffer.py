@@ -4,7 +4,7 @@ The loop's thread alone adds; a row counts once it is whole, so that a journal m
 another thread without a lock. Blocks of rows never move, and no earlier row is touched again.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,11 @@ class RowBuffer:
         How many numbers each group holds.
     texts : sequence of str
         Names of the columns of text.
+
+    Attributes
+    ----------
+    mirror : callable or None
+        Given each row that is added, all its numbers (n,) and texts, to copy it elsewhere.
     """
 
     def __init__(self, groups: Mapping[str, int], texts: Sequence[str] = ()) -> None:
@@ -36,6 +41,7 @@ class RowBuffer:
         self._blocks: list[Floats] = []
         self._texts: dict[str, list[str]] = {name: [] for name in texts}
         self._count = 0
+        self.mirror: Callable[[Floats, Sequence[str]], None] | None = None
 
     def __len__(self) -> int:
         return self._count
@@ -65,6 +71,8 @@ class RowBuffer:
             column.append(text)
         # Last: whoever reads the length may read every row below it.
         self._count += 1
+        if self.mirror is not None:
+            self.mirror(row, texts)
 
     def extend(self, numbers: Floats, texts: Mapping[str, Sequence[str]]) -> None:
         """Add many rows at once.

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from dmpcli.arrays import Floats, Integers
+from dmpcli.messages import Advance
 from dmpcli.metrics import paper_values
 from dmpcli.records.dataset import BatchFolder, facts_of, part_of, states_of
 from dmpcli.reporting.batch_measures import (
@@ -229,7 +230,7 @@ def measure(
     label: str,
     sight: MeasurementContext,
     tables: Tables | None,
-    advance: Callable[[int], None],
+    advance: Advance,
     elsewhere: Measure | None = None,
 ) -> MeasuredBatch:
     """Measure all strokes of a batch.
@@ -243,7 +244,7 @@ def measure(
         What to measure against.
     tables : Tables, optional
         Files for the numbers of every stroke.
-    advance : callable
+    advance : Advance
         Told how many strokes are done.
     elsewhere : callable, optional
         Measures parts in other processes; what is found does not depend on it.

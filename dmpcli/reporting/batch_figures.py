@@ -17,6 +17,9 @@ SHOWN = 3
 NEAR = 0.2
 """The demonstration's wave height is shown with those that are off by less than this share."""
 
+UNSEEN = 5e-4
+"""Strokes that differ by no more are alike, mm or degrees: no table has so many digits."""
+
 TITLES = {
     "wave_height": "wave height / mm",
     "nearest_rms": "deviation, RMS / mm",
@@ -53,9 +56,8 @@ def distributions(many: MeasuredBatch) -> Figure | None:
         if target is not None and abs(target - np.median(values)) > NEAR * target:
             target = None
         _bars(axes, values, target)
-        axes.set_xlabel(TITLES[name])
-        axes.set_ylabel("strokes")
-        drawing.letter(axes, "abcdefgh"[i])
+        drawing.labels(axes, TITLES[name], "" if i % 2 else "strokes")
+        drawing.title(axes, f"({'abcdefgh'[i]})")
     height = float(figure.get_size_inches()[1])
     figure.text(0.5, 1.0 - 0.5 * drawing.ROW / height,
         f"{many.label}: {len(many.batch):,} strokes; shaded: 90 % of them",
@@ -88,7 +90,7 @@ def bins_of(values: Floats) -> int:
 def _bars(axes: Axes, values: Floats, target: float | None) -> None:
     """Draw a histogram of values (k,), and where the demonstration stands."""
     shown = values if target is None else np.append(values, target)
-    if float(np.ptp(values)) <= ALIKE * max(1.0, float(np.abs(values).max())):
+    if float(np.ptp(values)) <= max(ALIKE * float(np.abs(values).max()), UNSEEN):
         _alike(axes, values)
         return
     counted = histogram(values, float(shown.min()), float(shown.max()), bins_of(values))
@@ -134,10 +136,10 @@ def worst(many: MeasuredBatch) -> Figure | None:
     ratio = min(1.5, max(0.4, 1.15 * tall / span))
     cell = _CELL * ratio
     across, up = _CELL + _CELL_GAP, cell + 0.75
-    figure = drawing.page(0.4 + SHOWN * across + _RIGHT, len(rows) * up + drawing.ROW + 0.1)
+    figure = drawing.page(0.7 + SHOWN * across + _RIGHT, len(rows) * up + drawing.ROW + 0.1)
     for r, c, name, row in cells:
         bottom = 0.5 + drawing.ROW + (len(rows) - 1 - r) * up
-        axes = drawing.panel(figure, 0.65 + c * across, bottom, _CELL, cell)
+        axes = drawing.panel(figure, 0.95 + c * across, bottom, _CELL, cell)
         *taught, drawn = curves[row]
         for curve in taught:
             drawing.draw(axes, curve[:, 0], curve[:, 1], STYLES["demonstration"])
@@ -146,9 +148,9 @@ def worst(many: MeasuredBatch) -> Figure | None:
         axes.set_aspect("equal", adjustable="datalim")
         axes.locator_params(nbins=4)
         if r == len(rows) - 1:
-            axes.set_xlabel("along / mm")
+            drawing.labels(axes, x="along / mm")
         if c == 0:
-            axes.set_ylabel("across / mm")
+            drawing.labels(axes, y="across / mm")
         value = many.values(name)[row]
         axes.set_title(
             f"{many.batch.ids[row].as_py()}: {_ONE[name]} {value:.3f} mm", fontsize=7.5, pad=3.0

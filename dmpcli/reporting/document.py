@@ -341,11 +341,12 @@ def _remarks(report: Row, rows: Sequence[Row]) -> list[str]:
     for row in rows:
         raw = row["as_recorded"]
         if raw:
-            height = tables.number(raw["wave_height"], 3)
+            height = raw["wave_height"]
+            said = "" if height is None else f"as recorded the height is {height:.3f}, "
             kind = "simulated demonstration" if row["simulated"] else "demonstration"
             remarks.append(
-                f"{row['stroke']}: {kind}, smoothed as fit does; as recorded the height is "
-                f"{height}, smoothing took off {raw['removed_rms']:.3f} RMS."
+                f"{row['stroke']}: {kind}, smoothed as fit does; {said}smoothing took off "
+                f"{raw['removed_rms']:.3f} RMS."
             )
         if row["by_skill"]:
             remarks.append(

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from dmpcli.arrays import Floats
 from dmpcli.dmp.skill import Skill
 from dmpcli.records.record import Record
-from dmpcli.reporting import batch_figures, drawing, pose_errors, run_figures
+from dmpcli.reporting import batch_figures, drawing, pose_errors, ruling, run_figures
 from dmpcli.reporting.batch import MeasuredBatch
 from dmpcli.reporting.contact_figure import contact_figure
 from dmpcli.reporting.curve_names import name_of, named, short
@@ -105,6 +105,7 @@ class Shown:
 
     def saved(self, name: str, title: str, caption: str, figure: Figure) -> ReportFigure:
         """Return a figure as its files."""
+        ruling.rule(figure)
         return ReportFigure(name, title, caption, drawing.saved(figure, self.png))
 
 

@@ -94,7 +94,7 @@ $origin
 </section>
 </main>
 <footer>Made by dmpcli $tool. The same numbers stand in report.json, every wave height in
-wave_heights.csv, the figures as SVG and PNG beside this page.</footer>
+wave_heights.csv, the figures as files of their own beside this page.</footer>
 </body>
 </html>
 """)

@@ -61,11 +61,10 @@ def spread_curves(skill: Skill) -> Figure:
             axes.set_xlim(0.0, 1.0)
             axes.tick_params(labelbottom=number == len(rows) - 1)
             if number == len(rows) - 1:
-                axes.set_xlabel("share of the duration")
+                drawing.labels(axes, x="share of the duration")
         if number == 0:
-            left.set_title("(a)  mean, and one standard deviation", loc="left", fontsize=8.0)
-            right.set_title("(b)  standard deviation", loc="left", fontsize=8.0)
-    figure.align_ylabels()
+            drawing.title(left, "(a)  mean, and one standard deviation")
+            drawing.title(right, "(b)  standard deviation")
     return figure
 
 
@@ -79,11 +78,11 @@ def _band(axes: Axes, share: Floats, row: _Row) -> None:
         axes.legend(fontsize=7.0, ncols=3, loc="best", handlelength=2.4, borderaxespad=0.2)
     margin = 0.06 * max(float(high.max() - low.min()), row.least)
     axes.set_ylim(float(low.min()) - margin, float(high.max()) + margin)
-    axes.set_ylabel(f"{row.name} / {row.unit}")
+    drawing.labels(axes, y=f"{row.name} / {row.unit}")
 
 
 def _alone(axes: Axes, share: Floats, row: _Row) -> None:
     for i, (_, line) in zip(range(row.mean.shape[1]), _ANGLES, strict=False):
         axes.plot(share, row.deviation[:, i], color="#0072B2", ls=line, lw=1.2)
     axes.set_ylim(0.0, 1.08 * max(float(row.deviation.max()), row.least))
-    axes.set_ylabel(f"/ {row.unit}")
+    drawing.labels(axes, y=f"/ {row.unit}")

@@ -76,6 +76,8 @@ def _drawn(record: Record, label: str, normal: Floats | None) -> list[ReportedSt
     for name, group in groups.items():
         known = dict(facts.get("trajectory", facts)) | own.get(name, {})
         known.setdefault("simulated", facts.get("simulated", False))
+        if dict(facts.get("goals") or {}).get("taken"):
+            known["goal"] = facts["goals"]["last"]  # of a goal that moved while it was drawn
         full = f"{label}[{name}]" if several else label
         drawn = tracking.reached(record, _enough(group))
         one = stored(drawn, name, _enough(np.arange(len(drawn.t))), known)

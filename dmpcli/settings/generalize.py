@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Le
 
-from dmpcli.dmp.options import Amplitude, OnBorder, Orientation
+from dmpcli.dmp.options import Amplitude, Kernels, OnBorder, Orientation
 from dmpcli.settings.model import Option, Settings
 from dmpcli.settings.process import ProcessSettings
 
@@ -72,11 +72,24 @@ class GeneralizeSettings(ProcessSettings):
     allow_stretch: Annotated[
         bool, Option("Start and goal at any distance, however it distorts.")
     ] = False
+    kernels: Annotated[
+        Kernels,
+        Option("Draw with compiled kernels, or with numpy; auto: large tables, if they are here."),
+    ] = "auto"
 
     def as_options(self) -> dict[str, Any]:
-        """Return the settings as JSON values; a force that nobody asked for leaves no trace."""
-        said = super().as_options()
-        return said if self.force_setpoint else {k: v for k, v in said.items() if k != _FORCE}
+        """Return the settings as JSON values.
+
+        A force that nobody asked for leaves no trace, nor do kernels that nothing is drawn with.
+        """
+        absent = set() if self.force_setpoint else {_FORCE}
+        absent |= set() if self.compiled else {"kernels"}
+        return {k: v for k, v in super().as_options().items() if k not in absent}
+
+    @property
+    def compiled(self) -> bool:
+        """Whether strokes are drawn by compiled kernels; `auto` has to be decided by then."""
+        return self.kernels == "compiled"
 
     def style(self) -> "GeneralizeOptions":
         """Return the settings as the mathematics takes them; heights are for the skill to tell."""
@@ -92,6 +105,7 @@ class GeneralizeSettings(ProcessSettings):
             turn=math.radians(self.turn),
             allow_stretch=self.allow_stretch,
             force=self.force_setpoint,
+            compiled=self.compiled,
         )
 
 

@@ -33,17 +33,32 @@ def start(
         )
 
     ahead, behind = front(1.0), front(-1.0)
-    stepping.start(mesh.facets, _limits(), _walks(ahead), _walks(behind))
+    doubt = np.zeros(len(position), dtype=bool)
+    stepping.start(mesh.facets, _limits(), _walks(ahead), _walks(behind), doubt)
+    rows = np.flatnonzero(doubt)
+    if len(rows):
+        places = position[rows], normal[rows], direction[rows]
+        fronts = geodesic_stepping.start(mesh, *places, step[rows], sign[rows], part[rows])
+        for mine, theirs in zip((ahead, behind), fronts, strict=True):
+            mine.before[rows], mine.trend[rows] = theirs.before, theirs.trend
     return ahead, behind
 
 
-def walk(mesh: TriangleMesh, front: Front, steps: Integers) -> tuple[Booleans, Booleans]:
-    """Walk so many steps (M,) in place; tell which met a crease, and which were ever off."""
+def walk(mesh: TriangleMesh, front: Front, steps: Integers) -> tuple[Booleans, Booleans, Integers]:
+    """Walk so many steps (M,) in place.
+
+    Returns
+    -------
+    sharp, off : array of bool, shape (M,)
+        Which walks met a crease, and which were ever off.
+    doubtful : array of int
+        Walks that stand where they began, for `geodesic_stepping` to walk.
+    """
     from dmpcli.surfaces.kernels import stepping
 
-    sharp, off = np.zeros((2, len(steps)), dtype=bool)
-    stepping.ends(mesh.facets, _limits(), _walks(front), steps, sharp, off)
-    return sharp, off
+    sharp, off, doubt = np.zeros((3, len(steps)), dtype=bool)
+    stepping.ends(mesh.facets, _limits(), _walks(front), steps, sharp, off, doubt)
+    return sharp, off, np.flatnonzero(doubt)
 
 
 def walk_lines(
@@ -52,7 +67,7 @@ def walk_lines(
     rows: tuple[Integers, Integers],
     nodes: tuple[int, int],
     out: tuple[Floats, Floats, Floats, Floats, Booleans, Booleans],
-) -> None:
+) -> Booleans:
     """Fill nodes of lines.
 
     Parameters
@@ -63,11 +78,17 @@ def walk_lines(
     nodes : int, int
         Where the walks stand, and 1 or -1 for the way along the line.
     out : position, direction, normal (lines, count, 3), away, sharp, back (lines, count)
+
+    Returns
+    -------
+    array of bool, shape (M,)
+        Walks that are for `geodesic_stepping` to walk; their nodes mean nothing.
     """
     from dmpcli.surfaces.kernels import stepping
 
-    where = stepping.Nodes(*out)
-    stepping.lines(mesh.facets, _limits(), _walks(front), *rows, *nodes, where)
+    where, doubt = stepping.Nodes(*out), np.zeros(len(rows[0]), dtype=bool)
+    stepping.lines(mesh.facets, _limits(), _walks(front), *rows, *nodes, where, doubt)
+    return doubt
 
 
 def _limits() -> "stepping.Limits":

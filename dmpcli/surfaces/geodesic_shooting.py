@@ -114,17 +114,25 @@ def by_steps(mesh: TriangleMesh, aim: Aim) -> Ends:
     begun = aim.origin, aim.normal, aim.direction, step, aim.sign, aim.part
     if mesh.compiled:
         front, _ = compiled_stepping.start(mesh, *begun)
-        sharp, off = compiled_stepping.walk(mesh, front, aim.steps)
-        return Ends(front.position, front.direction, front.normal, sharp, off)
+        sharp, off, doubtful = compiled_stepping.walk(mesh, front, aim.steps)
+        ends = Ends(front.position, front.direction, front.normal, sharp, off)
+        if len(doubtful):
+            again = _walked(mesh, front.rows(doubtful), aim.steps[doubtful])
+            ends.fill(doubtful, again, np.ones(len(doubtful), dtype=bool))
+        return ends
     front, _ = geodesic_stepping.start(mesh, *begun)
-    ends = Ends.unknown(len(aim.steps))
+    return _walked(mesh, front, aim.steps)
+
+
+def _walked(mesh: TriangleMesh, front: geodesic_stepping.Front, steps: Integers) -> Ends:
+    ends = Ends.unknown(len(steps))
     sharp, off = ends.sharp.copy(), ends.off.copy()
-    active = np.arange(len(aim.steps))
-    for number in range(1, int(aim.steps.max(initial=0)) + 1):
+    active = np.arange(len(steps))
+    for number in range(1, int(steps.max(initial=0)) + 1):
         front, marks = geodesic_stepping.advance(mesh, front)
         sharp[active] |= marks.sharp
         off[active] |= marks.off
-        done = aim.steps[active] == number
+        done = steps[active] == number
         if done.any():
             rows = active[done]
             here = Ends(front.position, front.direction, front.normal, sharp[active], off[active])

@@ -60,7 +60,7 @@ class Front:
     trend: Floats
     away: Floats
 
-    def rows(self, rows: Booleans) -> "Front":
+    def rows(self, rows: Booleans | Integers) -> "Front":
         """Return some of the walks."""
         return Front(*(getattr(self, field.name)[rows] for field in fields(self)))
 

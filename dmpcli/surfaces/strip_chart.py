@@ -165,12 +165,26 @@ def _feet(
     (i, r), (j, s) = u, v
     pair = np.arange(len(i))[:, None]
     point, e_v = _bicubic(nodes, pair, i, j, r, s)
+    return _feet_of(mesh, centre, nodes, (pair, i, j, r, s), point, e_v)
+
+
+def _feet_of(
+    mesh: TriangleMesh,
+    centre: Centre,
+    nodes: Nodes,
+    cells: tuple[Integers, Integers, Integers, Floats, Floats],
+    point: Floats,
+    e_v: Floats,
+) -> _Feet:
+    """Put points (B, T, 3) of pairs' cells onto the mesh."""
+    pair, i, j, r, s = cells
     flat = point.reshape(-1, 3)
     found, face = mesh.search(flat)
-    sign = np.repeat(centre.sign, i.shape[1], axis=0)
-    normal = (sign * mesh.smooth_normals(found, face)).reshape(point.shape)
+    own = np.broadcast_to(pair, i.shape).reshape(-1)
+    normal = centre.sign[own] * mesh.smooth_normals(found, face)
+    normal = normal.reshape(point.shape)
     foot = found.reshape(point.shape)
-    elsewhere = mesh.components[face] != np.repeat(centre.part, i.shape[1])
+    elsewhere = mesh.components[face] != centre.part[own]
     beyond = (elsewhere | mesh.beyond_border(flat, found, face)).reshape(i.shape)
     nearest = pair, i + (r > 0.5), j + (s > 0.5)
     back = ~beyond & (dot(normal, nodes.normal[nearest])[..., 0] < 0.0)
@@ -187,8 +201,8 @@ def _feet_compiled(
     from dmpcli.surfaces.kernels import samples
 
     shape = along.shape
-    foot, e_v, normal = (np.empty((*shape, 3)) for _ in range(3))
-    beyond, far, back = np.empty((3, *shape), dtype=bool)
+    foot, e_v, normal, point, slope = (np.empty((*shape, 3)) for _ in range(5))
+    beyond, far, back, doubt = np.empty((4, *shape), dtype=bool)
     feet = _Feet(foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back)
     samples.lift(
         mesh.facets,
@@ -198,8 +212,18 @@ def _feet_compiled(
         centre.sign,
         centre.part,
         samples.Limits(ON_BORDER, geodesic_stepping.LANDING),
-        samples.Feet(foot, e_v, normal, feet.face, feet.stretch, beyond, far, back),
+        samples.Feet(
+            foot, e_v, normal, feet.face, feet.stretch, beyond, far, back, doubt, point, slope
+        ),
     )
+    pair, k = np.nonzero(doubt)
+    if len(pair):
+        u, v = along[pair, k, None], aside[pair, k, None]
+        i, j = (_cell(u, nodes.values.shape[1] - 1), _cell(v, nodes.values.shape[2] - 1))
+        cells = pair[:, None], i, j, u - i, v - j
+        some = _feet_of(mesh, centre, nodes, cells, point[pair, k, None], slope[pair, k, None])
+        for name in ("foot", "across", "normal", "face", "beyond", "far", "back"):
+            getattr(feet, name)[pair, k] = getattr(some, name)[:, 0]
     return feet
 
 

@@ -235,8 +235,10 @@ class _Lines:
     ) -> None:
         if mesh.compiled:
             out = self.position, self.direction, self.normal, self.away, self.sharp, self.back
-            compiled_stepping.walk_lines(mesh, front, (rows, count), (at, way), out)
-            return
+            doubt = compiled_stepping.walk_lines(mesh, front, (rows, count), (at, way), out)
+            if not doubt.any():
+                return
+            front, rows = front.rows(doubt), rows[doubt]
         for k in range(1, int(count.max(initial=0)) + 1):
             on = count[rows] >= k
             if not on.all():

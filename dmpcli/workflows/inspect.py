@@ -2,14 +2,19 @@
 
 from pathlib import Path
 
+import numpy as np
+
+from dmpcli.errors import InputError
 from dmpcli.messages import tell
-from dmpcli.records import file_io, mesh
+from dmpcli.records import file_io, learned_skill, mesh
 from dmpcli.records.layouts import Layout
 from dmpcli.reporting import inspection
 from dmpcli.reporting.stroke_measures import Row
 
 
-def inspect(file: str, layout: Layout | None = None, options: str = "") -> Row:
+def inspect(
+    file: str, layout: Layout | None = None, options: str = "", skill: Path | None = None
+) -> Row:
     """Describe a file, and tell what will take its time.
 
     Parameters
@@ -20,6 +25,8 @@ def inspect(file: str, layout: Layout | None = None, options: str = "") -> Row:
         How a recording of another program is read.
     options : str
         That say it, as they are typed.
+    skill : Path, optional
+        What is to be drawn on the mesh that the file is.
 
     Raises
     ------
@@ -32,4 +39,27 @@ def inspect(file: str, layout: Layout | None = None, options: str = "") -> Row:
     waiting = mesh.waiting(source)
     if waiting is not None:
         tell(waiting)
-    return inspection.inspected(source, layout, options)
+    found = inspection.inspected(source, layout, options)
+    if skill is not None:
+        found["told"] = _rooms(file, found, skill)
+    return found
+
+
+def _rooms(file: str, found: Row, skill: Path) -> list[str]:
+    """Say where on a mesh a skill is drawn."""
+    from dmpcli.workflows import room_for, surface_input
+
+    if "vertices" not in found.get("content", {}):
+        raise InputError(f"--for: {file} is no mesh, so that nothing is drawn on it; leave it out")
+    learned = learned_skill.read(file_io.read(skill))
+    read = surface_input.read(Path(file), None, None)
+    places = room_for.rooms_for(read, learned)
+    if places:
+        return [f"room for {skill}: {mesh.as_options(place)}" for place in places]
+    room = room_for.footprint(learned)
+    along, across = np.ptp(room.path, axis=0)
+    return [
+        f"room for {skill}: on none of its smooth patches ({along:.0f} mm along, {across:.0f} mm "
+        "across); --amplitude scale makes a shorter stroke lower, and over rounded edges one may "
+        "be drawn all the same"
+    ]

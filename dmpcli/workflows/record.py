@@ -228,13 +228,8 @@ def _recording(
 
 def _view(recorder: Recorder, settings: RecordSettings) -> watching.RunView:
     """What is seen of a recording while it goes on; of its end only what a duration says."""
-    whole = settings.duration
-    return watching.RunView(
-        "recording",
-        recorder.log.rows,
-        1.0 / settings.control_rate,
-        lambda t: None if whole is None else min(t / whole, 1.0),
-    )
+    period = 1.0 / settings.control_rate
+    return watching.RunView("recording", recorder.log.rows, period, settings.duration)
 
 
 def _ending(outcome: LoopOutcome) -> str:

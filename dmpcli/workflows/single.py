@@ -18,6 +18,9 @@ from dmpcli.surfaces.surface import LEAVES
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import pieces, warn_of_speed
 
+CREASE = "the stroke crosses a sharp crease, where no tool can follow the surface"
+"""What is told of a stroke that was walked facet by facet over one."""
+
 
 @dataclass(frozen=True)
 class DrawnPair:
@@ -79,7 +82,7 @@ def draw_one(ready: Ready) -> DrawnPair:
         )
         tell(f"start moved {moved[0, 0]:.3f} mm and goal {moved[1, 0]:.3f} mm onto the surface")
     if any(stroke.unfolded for stroke in strokes):
-        warn("the stroke crosses a sharp crease, where no tool can follow the surface")
+        warn(CREASE)
     warn_of_speed(strokes, ids, task.style)
     rate, model = task.style.rate, task.skill.model
     split = any(stroke.cuts for stroke in drawn)

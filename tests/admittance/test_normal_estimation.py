@@ -1,9 +1,11 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmpcli.admittance.normal_estimation import NormalEstimator, turned
+from dmpcli.admittance.normal_estimation import NormalEstimator, carried, turned
 from dmpcli.spatial.rotations import exp, smallest_between
 
 PERIOD = 0.02
@@ -70,6 +72,8 @@ def test_a_tool_that_stands_or_is_lifted_tells_nothing():
     assert not estimator.feel(np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]), UP)
     assert not estimator.feel(np.array([1.0, 0.0, -0.1]), np.array([20.0, 0.0, 0.0]), UP)
     np.testing.assert_allclose(estimator.normal, UP)
+    with pytest.raises(ValueError, match="nothing is known"):
+        NormalEstimator(PERIOD).normal  # noqa: B018
     assert estimator.heard == 0
 
 
@@ -84,6 +88,22 @@ def test_the_tilt_goes_along_with_a_planned_normal_that_turns():
         estimator.feel(5.0 * (true - 0.2 * slide), 15.0 * slide, planned)
         off.append(angle(estimator.normal, true))
     assert max(off[50:]) < 0.5
+
+
+def test_a_lean_is_carried_with_the_planned_normal_round_a_cylinder():
+    lean, way = np.radians(5.0), np.linspace(0.0, 1.2, 60)
+
+    def round_(phi):
+        return np.array([np.sin(phi), 0.0, np.cos(phi)])
+
+    for axis in (np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
+        made = exp(lean * axis) @ UP
+        for before, now in pairwise(way):
+            made = carried(made, round_(before), round_(now))
+        assert np.linalg.norm(made) == pytest.approx(1.0)
+        turn = exp(way[-1] * np.array([0.0, 1.0, 0.0]))
+        np.testing.assert_allclose(made, turn @ exp(lean * axis) @ UP, atol=1e-9)
+    np.testing.assert_array_equal(carried(UP, UP, round_(0.3)), round_(0.3))
 
 
 unit = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda v: v @ v > 0.01)

@@ -1,5 +1,6 @@
 """execute --goal-from: the goal moves while the stroke is drawn."""
 
+import json
 import socket
 import threading
 from functools import partial
@@ -49,6 +50,14 @@ def test_the_run_ends_at_the_last_goal_that_was_taken_and_holds_them_all(traj, g
     again = tmp_path / "again.parquet"
     execute(traj, "-o", again, "--goal-from", goals)
     assert again.read_bytes() == out.read_bytes()
+
+
+def test_the_report_measures_a_stroke_against_the_goal_that_it_was_led_to(traj, goals, tmp_path):
+    out = tmp_path / "run.parquet"
+    execute(traj, "-o", out, "--goal-from", goals, "-q")
+    (row,) = json.loads(ended("report", out, "--json").stdout)["files"][0]["strokes"]
+    np.testing.assert_allclose(row["goal"], [-665.0, 125.0, -17.56], atol=1e-9)
+    assert row["goal_error"] < 0.05
 
 
 def test_pressed_the_goal_moves_along_the_plane_and_the_force_is_held(traj, goals, tmp_path):

@@ -103,6 +103,13 @@ def test_a_goal_that_moves_at_the_end_is_run_after_until_it_is_reached():
     assert 1.5 < late < 2.5  # ten times 2 tau/d
 
 
+def test_a_goal_that_comes_nearer_asks_less_of_the_arm():
+    """Half as far as the stroke leads in the end: it is no arm that has not moved."""
+    run = Run([(1.0, (60.0, 0.0, 0.0))]).run()
+    assert (run.outcome.reason, run.loop.drawn) == (DONE, ["0"])
+    np.testing.assert_allclose(run.sent[-1], GOAL + [60.0, 0.0, 0.0], atol=1e-9)
+
+
 def test_without_news_the_set_points_are_those_of_the_plan():
     run = Run([(99.0, (1.0, 0.0, 0.0))]).run()
     np.testing.assert_array_equal(run.sent[: len(SHORT)], SHORT.position)

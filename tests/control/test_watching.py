@@ -17,7 +17,7 @@ import pytest
 from dmpcli import live_view
 from dmpcli.control import watching
 from dmpcli.control.run_log import Row, RunLog
-from dmpcli.live_view import SIZE, SharedSnapshot
+from dmpcli.live_view import SIZE, RowView, SharedRow
 from tests.commands.test_execute import columns, written
 
 DMPCLI = str(Path(sys.executable).with_name("dmpcli"))
@@ -33,26 +33,43 @@ def drawn(content):
         return console.export_text()
 
 
-def logged(count, late=0.0004, **more):
-    log = RunLog(sensed=True, coupled=True)
-    for k in range(count):
+def add(log, numbers, late=0.0004):
+    for k in numbers:
         pose = (np.array([1.0 * k, 2.0, 3.0]), np.eye(3))
         wrench = np.array([1.0, 2.0, 2.0, 0.1, 0.0, 0.0])
         log.add(
             0.02 * k,
             Row(
                 0.02 * k, 0.02 * k, pose, pose, pose, 0.02 * k, late, wrench, 0.25, "ready",
-                "stroke", "a", **more,
+                "stroke", "a",
             ),
         )  # fmt: skip
+
+
+def logged(count, late=0.0004):
+    log = RunLog(sensed=True, coupled=True)
+    add(log, range(count), late)
     return log
 
 
+@contextlib.contextmanager
+def mirrored(log, whole=None):
+    """A view of a log's rows, and what the process that draws reads of them."""
+    view = watching.RunView("executing", log.rows, 0.02, whole)
+    with tempfile.TemporaryFile() as file:
+        file.truncate(SIZE)
+        seen = RowView.of_json(view.of_rows().json())
+        log.rows.mirror = SharedRow(file.fileno(), view.of_rows()).put
+        yield SharedRow(file.fileno(), seen)
+
+
 def test_a_view_says_pose_force_lateness_contact_and_share():
-    log = logged(11)
-    view = watching.RunView("executing", log.rows, 0.02, lambda t: t / 0.4)
-    seen = view.now()
+    log = logged(0)
+    with mirrored(log, whole=0.4) as theirs:
+        add(log, range(11))
+        seen = theirs.read()
     assert seen["pose"][:3] == [10.0, 2.0, 3.0]
+    assert seen["pose"][3:] == pytest.approx([0.0, 0.0, 0.0])
     assert seen["force"] == [1.0, 2.0, 2.0]
     assert seen["share"] == pytest.approx(0.5)
     assert (seen["late"], seen["worst"]) == pytest.approx((0.4, 0.4))
@@ -62,32 +79,36 @@ def test_a_view_says_pose_force_lateness_contact_and_share():
 
 
 def test_the_worst_lateness_is_that_of_all_rows_since_the_view_began():
-    log = logged(5, late=0.003)
-    view = watching.RunView("executing", log.rows, 0.02)
-    assert view.now()["worst"] == pytest.approx(3.0)
-    for k in range(5, 9):
-        pose = (np.zeros(3), np.eye(3))
-        log.add(0.02 * k, Row(0.02 * k, 0, pose, pose, pose, 0, 1e-4, np.zeros(6), 0, "ready", "x"))
-    seen = view.now()
+    log = logged(0)
+    with mirrored(log) as theirs:
+        add(log, range(5), late=0.003)
+        assert theirs.read()["worst"] == pytest.approx(3.0)
+        add(log, range(5, 9), late=1e-4)
+        seen = theirs.read()
     assert (seen["late"], seen["worst"]) == pytest.approx((0.1, 3.0))
+    assert seen["share"] is None
+
+
+def test_a_row_that_was_never_sent_has_no_lateness_to_show():
+    log = logged(0)
+    with mirrored(log) as theirs:
+        add(log, range(1), late=np.nan)
+        assert "late" not in drawn(theirs.read())
 
 
 def test_there_is_nothing_to_see_before_the_first_row():
-    assert watching.RunView("executing", RunLog().rows, 0.02).now() is None
-
-
-def test_a_snapshot_is_read_whole_or_not_at_all():
-    with tempfile.TemporaryFile() as file:
-        file.truncate(SIZE)
-        ours, theirs = SharedSnapshot(file.fileno()), SharedSnapshot(file.fileno())
+    with mirrored(logged(0)) as theirs:
         assert theirs.read() is None
-        texts = ["a" * 3000, "b" * 3000]
+
+
+def test_a_row_is_read_whole_or_not_at_all():
+    log = logged(0)
+    with mirrored(log) as theirs:
         over = threading.Event()
 
         def write():
             while not over.is_set():
-                for text in texts:
-                    ours.write({"text": text})
+                add(log, range(2))
 
         thread = threading.Thread(target=write)
         thread.start()
@@ -95,14 +116,10 @@ def test_a_snapshot_is_read_whole_or_not_at_all():
         while len(found) < 200:
             seen = theirs.read()
             if seen is not None:
-                found.append(seen["text"])
+                found.append((seen["t"], seen["pose"][0]))
         over.set()
         thread.join()
-        assert set(found) <= set(texts)
-        ours.write({"text": "c" * 2 * SIZE})  # what does not fit is left out
-        assert theirs.read()["text"] in texts
-        ours.close()
-        theirs.close()
+    assert set(found) <= {(0.0, 0.0), (0.02, 1.0)}
 
 
 def watched(tmp_path, *words, interrupt=None):
@@ -178,5 +195,6 @@ def test_a_view_that_cannot_be_had_costs_nothing(monkeypatch):
         raise OSError("no processes left")
 
     monkeypatch.setattr(watching.subprocess, "Popen", fail)
-    with watching.live(lambda: None, True) as ended:
+    view = watching.RunView("executing", logged(0).rows, 0.02)
+    with watching.live(lambda: view, True) as ended:
         ended("done")

@@ -142,5 +142,7 @@ def test_the_tutorial_goes_from_a_clone_to_a_page_in_eight_commands(shared, monk
     assert len(typed) <= 8
     assert typed[-1].startswith("xdg-open ")
     [drawn] = [line for line in typed if line.startswith("dmpcli generalize")]
-    proposed = re.search(r"room: (--start .+ --goal .+?)  ", ended("inspect", "part.stl").stdout)
+    ended("fit", "mine.csv", "-o", "own.json")
+    said = ended("inspect", "part.stl", "--for", "own.json").stdout
+    proposed = re.search(r"room for own.json: (--start .+ --goal .+?)  ", said)
     assert proposed[1] in drawn

@@ -18,6 +18,7 @@ def wall(thickness):
     ("thickness", "off", "wrong"),
     [
         (0.8, 0.0, True),  # thinner than a millimetre is thin
+        (1.0, 0.0, True),  # and so is one of just a millimetre
         (1.2, 0.0, False),
         (1.2, 0.4, True),  # as is what is thinner than four times the distance
         (1.2, 0.2, False),

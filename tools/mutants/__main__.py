@@ -21,10 +21,11 @@ import subprocess
 import sys
 import time
 import tomllib
+import traceback
 from pathlib import Path
 from typing import Any
 
-from tools.mutants import choice, operators, reach, trial
+from tools.mutants import choice, operators, reach, trial, warm
 
 ROOMS = ("dmp", "admittance", "surfaces", "metrics", "planning", "control")
 OTHERS = ("records", "reporting", "calibration")
@@ -110,8 +111,9 @@ def judged(mutant: operators.Mutant, known: reach.Reach, budget: float) -> Row:
     begun = time.monotonic()
     for tests in choice.stages(mutant, known, budget):
         row["tests"] += len(tests)
-        limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
-        verdict = trial.attempt(mutant.file, mutant, tests, limit)
+        verdict = trial.attempt(mutant.file, mutant, {test: known.seconds[test] for test in tests})
+        if verdict.misfit:
+            return {"misfit": True}
         row |= {"killed": verdict.killed, "by": verdict.by, "how": verdict.how}
         if verdict.trouble:
             row["trouble"] = verdict.trouble
@@ -126,8 +128,9 @@ def unharmed(sample: list[operators.Mutant], known: reach.Reach, budget: float) 
     failed = []
     for mutant in sample:
         for tests in choice.stages(mutant, known, budget):
-            limit = 5.0 + 4.0 * sum(known.seconds[test] for test in tests)
-            verdict = trial.attempt(mutant.file, None, tests, limit)
+            verdict = trial.attempt(
+                mutant.file, None, {test: known.seconds[test] for test in tests}
+            )
             if verdict.killed or verdict.trouble:
                 failed.append(f"{verdict.by} {verdict.how}{verdict.trouble}")
     return {"name": "unharmed", "failed": failed}
@@ -145,10 +148,9 @@ def run(
         worker = os.fork()
         if worker == 0:
             try:
-                for mutant in left[job::jobs]:
-                    _keep(kept, judged(mutant, known, budget))
-                if job == 0 and "unharmed" not in done:
-                    _keep(kept, unharmed(mutants[:5], known, budget))
+                _work(left[job::jobs], known, budget, kept)
+            except BaseException:
+                traceback.print_exc()
             finally:
                 os._exit(0)
         workers.append(worker)
@@ -161,6 +163,29 @@ def run(
     if rows["unharmed"]["failed"]:
         raise SystemExit(f"fail without a mutant too: {rows['unharmed']['failed']}")
     return [rows[name] for name in names[1:]]
+
+
+def _work(mutants: list[operators.Mutant], known: reach.Reach, budget: float, kept: Path) -> None:
+    """Judge mutants one after the other, each where it can be judged the soonest."""
+    outer = [mutant for mutant in mutants if not mutant.in_function]
+
+    def here(number: int) -> Row:
+        if number < 0:
+            return unharmed(outer[:2], known, budget)
+        return judged(mutants[number], known, budget)
+
+    anew = warm.apart(here)
+
+    def work() -> None:
+        for number, mutant in enumerate(mutants):
+            row = here(number) if warm.fits(mutant) else anew(number)
+            _keep(kept, anew(number) if "misfit" in row else row)
+        if "unharmed" not in {row["name"] for row in _rows(kept)}:
+            row = unharmed([mutant for mutant in mutants if mutant.in_function][:8], known, budget)
+            _keep(kept, row | {"failed": row["failed"] + anew(-1)["failed"]})
+
+    files = [test.partition("::")[0] for test in known.seconds]
+    warm.within(files, [*reach.QUIET, "--tb=no"], work)
 
 
 def _keep(kept: Path, row: Row) -> None:
@@ -185,20 +210,20 @@ def equivalents() -> dict[str, str]:
 def table(rows: list[Row]) -> str:
     """Rooms by what became of their mutants; the score counts equivalents out."""
     same = equivalents()
-    head = ("room", "mutants", "killed", "by its own room", "equivalent", "survived", "score")
+    head = ("room", "mutants", "killed", "by kept results", "equivalent", "survived", "score")
     lines = ["| " + " | ".join(head) + " |", "|---|" + "--:|" * (len(head) - 1)]
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     for row in rows:
-        own = row["killed"] and choice.room(row["by"] + "/-/-") == row["room"]
+        kept = row["killed"] and choice.is_kept(row["by"])
         what = "killed" if row["killed"] else "equivalent" if row["name"] in same else "survived"
         for room in (row["room"], "all"):
-            counts[room].update([what, "mutants", *(["own"] if own else [])])
+            counts[room].update([what, "mutants", *(["kept"] if kept else [])])
     for room in [*(room for room in ROOMS if room in counts), "all"]:
         n = counts[room]
         score = n["killed"] / max(n["mutants"] - n["equivalent"], 1)
         cells = [
             room,
-            *(str(n[key]) for key in ("mutants", "killed", "own", "equivalent", "survived")),
+            *(str(n[key]) for key in ("mutants", "killed", "kept", "equivalent", "survived")),
         ]
         lines.append("| " + " | ".join([*cells, f"{score:.1%}"]) + " |")
     return "\n".join(lines)

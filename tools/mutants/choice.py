@@ -20,6 +20,11 @@ def mirrored(file: str) -> str:
     return f"tests/{room(file)}/test_{Path(file).stem}.py"
 
 
+def is_kept(test: str) -> bool:
+    """Whether a test holds results against those of an earlier day, whatever is right."""
+    return test.partition("::")[0].endswith("/test_kept.py")
+
+
 def named_by(statement: ast.stmt) -> set[str]:
     """Names that a statement of a module or a class defines."""
     match statement:
@@ -59,25 +64,30 @@ def reached(mutant: Mutant, reach: Reach) -> set[str]:
 
 
 def stages(mutant: Mutant, reach: Reach, budget: float) -> list[list[str]]:
-    """Tests in the order of use: the mirrored file's, the room's, those of the other rooms.
+    """Tests in the order of use, in processes of their own: the quickest to tell, then all others.
 
-    Those of the mirrored file that do not reach the mutant themselves come last: what it makes may
-    have been made, and kept, for a test before them. ``budget`` is how many seconds of tests, as
-    measured under coverage, one mutant is worth: what is left out can only lower the score.
+    Kept results come first, then the mirrored file's tests, the room's, and those of the other
+    rooms. Those of the mirrored file that do not reach the mutant themselves come last: what it
+    makes may have been made, and kept, for a test before them. ``budget`` is how many seconds of
+    tests, as measured under coverage, one mutant is worth, half of them for kept results: what is
+    left out can only lower the score.
     """
     found = reached(mutant, reach)
     mirror = mirrored(mutant.file)
-    own = {test for test in found if room(test) == room(mutant.file)}
+    kept = {test for test in found if is_kept(test)}
+    own = {test for test in found if room(test) == room(mutant.file)} - kept
     near = {test for test in own if test.startswith(mirror + "::")}
     beside = {test for test in reach.seconds if test.startswith(mirror + "::")} - found
-    groups = [near, own - near, found - own, beside if found else set()]
     left, result = budget, []
-    for group in groups:
+    for group in (kept, near, own - near, found - own - kept, beside if found else set()):
+        rest, spare = (left, 0.0) if group is not kept else (0.5 * left, 0.5 * left)
         taken: list[str] = []
         for test in sorted(group, key=lambda name: (reach.seconds[name], name)):
-            if reach.seconds[test] <= min(LONGEST, left):
+            if reach.seconds[test] <= min(LONGEST, rest):
                 taken.append(test)
-                left -= reach.seconds[test]
+                rest -= reach.seconds[test]
+        left = rest + spare
         if taken:
             result.append(taken)
-    return result
+    others = [test for group in result[1:] for test in group]
+    return [*result[:1], *([others] if others else [])]

@@ -17,29 +17,39 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, ModuleType
 
-import hypothesis
 import pytest
 
+from tools.mutants import warm
 from tools.mutants.operators import Mutant
 from tools.mutants.reach import QUIET
 
 _MEMORY = 4 * 2**30
 """Bytes beyond those of the parent."""
 
+_LIMIT = 5.0
+"""Seconds that any test, or loading them all, may take beside four times its own."""
+
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a test failed, which one, and how; ``trouble`` is a fault of the trial itself."""
+    """Whether a test failed, which one, and how; ``trouble`` is a fault of the trial itself.
+
+    A misfit is a mutant that could not be put in place of what is loaded.
+    """
 
     killed: bool
     by: str = ""
     how: str = ""
     trouble: str = ""
+    misfit: bool = False
+
+
+_LATE = (signal.SIGXCPU, signal.SIGKILL, signal.SIGPROF, signal.SIGALRM)
 
 
 class _Changed(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
@@ -75,20 +85,21 @@ class _Changed(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
 
 
 class _Told:
-    """A pytest plugin: the chosen tests in the given order, and each told as it begins or fails."""
+    """A pytest plugin: the chosen tests in the given order, and each told as it begins or fails.
 
-    def __init__(self, tests: list[str], pipe: int) -> None:
-        self.rank, self.pipe = {name: n for n, name in enumerate(tests)}, pipe
+    A test that takes much longer than it was measured to take ends the process: by the processor's
+    time, or by a clock where it waits.
+    """
+
+    def __init__(self, tests: Mapping[str, float], pipe: int) -> None:
+        self.seconds, self.pipe = tests, pipe
+        self.rank = {name: n for n, name in enumerate(tests)}
 
     def _tell(self, what: str, name: str) -> None:
         os.write(self.pipe, f"{what} {name}\n".encode())
 
     def pytest_sessionstart(self) -> None:
-        once = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
-        hypothesis.settings.register_profile(
-            "mutants", hypothesis.settings.default, phases=once, report_multiple_bugs=False
-        )
-        hypothesis.settings.load_profile("mutants")
+        warm.take_one_example()
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -97,6 +108,9 @@ class _Told:
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         self._tell("begun", nodeid)
+        limit = _LIMIT + 4 * self.seconds[nodeid]
+        signal.setitimer(signal.ITIMER_PROF, limit)
+        signal.setitimer(signal.ITIMER_REAL, 12 * limit)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed:
@@ -108,7 +122,7 @@ class _Told:
 
 
 def _in_child(
-    file: str, mutant: Mutant | None, tests: list[str], seconds: float, pipe: int
+    file: str, mutant: Mutant | None, tests: Mapping[str, float], seconds: float, pipe: int
 ) -> None:
     """Run the tests of one trial; never returns."""
     code = 70
@@ -125,12 +139,20 @@ def _in_child(
         path = Path(file).resolve()
         tree = mutant.placed() if mutant else ast.parse(path.read_text(encoding="utf-8"))
         changed = compile(tree, str(path), "exec")
+        scratch = tempfile.mkdtemp(prefix="mutant")
+        told = _Told(tests, pipe)
+        if warm.loaded() and (mutant is None or warm.fits(mutant)):
+            if mutant and not warm.put(changed):
+                os.write(pipe, b"misfit\n")
+            elif failed := warm.run(tests, scratch, told.pytest_runtest_logstart):
+                os.write(pipe, f"failed {failed}\n".encode())
+            code = 0
+            return
         name = ".".join(Path(file).with_suffix("").parts)
         sys.meta_path.insert(0, _Changed(name, path, changed))
-        scratch = tempfile.mkdtemp(prefix="mutant")
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         options = [*QUIET, "--tb=no", "-x", f"--basetemp={scratch}/t"]
-        code = int(pytest.main([*options, *files], plugins=[_Told(tests, pipe)]))
+        code = int(pytest.main([*options, *files], plugins=[told]))
     except SyntaxError:
         os.write(pipe, b"unloaded the module itself\n")
     except BaseException as error:
@@ -155,12 +177,14 @@ def _listen(pipe: int, until: float) -> tuple[bytes, bool]:
     return told, False
 
 
-def attempt(file: str, mutant: Mutant | None, tests: list[str], seconds: float) -> Verdict:
-    """Run tests with a module changed (None: as it is), fastest given first, until one fails.
+def attempt(file: str, mutant: Mutant | None, tests: Mapping[str, float]) -> Verdict:
+    """Run tests with a module changed (None: as it is), first given first, until one fails.
 
-    ``seconds`` is the processor time after which the trial is taken for endless, and a kill; six
-    times as much may pass on a clock, for a test that waits for ever.
+    Each test's seconds are what it takes of the processor. One that takes over four times as many
+    and some more is taken for endless, and so is the whole trial: a kill. On a clock twelve times
+    that may pass for one that waits for ever.
     """
+    seconds = _LIMIT + 4.0 * sum(tests.values())
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -177,6 +201,8 @@ def attempt(file: str, mutant: Mutant | None, tests: list[str], seconds: float) 
 
 
 def _judged(told: list[str], ended: bool, status: int) -> Verdict:
+    if "misfit" in told:
+        return Verdict(False, misfit=True)
     begun = [line.partition(" ")[2] for line in told if line.startswith("begun ")]
     by = begun[-1] if begun else "loading the tests"
     for line in told:
@@ -189,7 +215,7 @@ def _judged(told: list[str], ended: bool, status: int) -> Verdict:
     if not ended:
         return Verdict(True, by, "time limit")
     if not closed:
-        limit = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
+        limit = os.WIFSIGNALED(status) and os.WTERMSIG(status) in _LATE
         return Verdict(True, by, "time limit" if limit else "process died")
     if closed[-1] in ("0", "5"):
         return Verdict(False)

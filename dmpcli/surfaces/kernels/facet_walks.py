@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import corner, flat_normal, outward_of
 from dmpcli.surfaces.kernels.vectors import (
@@ -37,7 +37,7 @@ def _exit(reals: Floats, p: Vector, d: Vector, row: int, entry: int) -> tuple[in
 @kernel
 def run(
     reals: Floats,
-    numbers: Integers,
+    numbers: Halves,
     position: Floats,
     heading: Floats,
     rows: Integers,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers, Singles
 from dmpcli.surfaces.kernels import tree
 from dmpcli.surfaces.kernels.tree import Facets
 
@@ -49,12 +49,31 @@ def compiled(mesh: Geometry) -> Compiled:
     bits = np.array([1, 2, 4])
     ends = mesh.border_vertices[mesh.faces[order]]
     numbers[:, tree.FLAGS] = mesh.border[order] @ bits + 8 * (ends @ bits)
+    numbers[:, tree.FLAGS] += 64 * _split(mesh)[mesh.faces[order]].any(axis=1)
     numbers[:, tree.PART], numbers[:, tree.FACE] = mesh.components[order], order
     numbers[:, tree.VERTICES : tree.VERTICES + 3] = mesh.faces[order]
     return Compiled(Facets(_outwards(tree.boxes_of(reals, first)), first, reals, numbers), rows)
 
 
-def _outwards(boxes: Floats) -> Floats:
+def _split(mesh: Geometry) -> Booleans:
+    """Vertices (n,) about which facets have normals of their own, or that lie on one another."""
+    at, count = mesh.faces.reshape(-1), len(mesh.border_vertices)
+    normals = mesh.corner_normals.reshape(-1, 3)
+    one = np.zeros((count, 3))
+    one[at] = normals
+    split = np.zeros(count, dtype=bool)
+    split[at[(np.abs(normals - one[at]) > 1e-12).any(axis=1)]] = True
+    points = np.zeros((count, 3))
+    points[at] = mesh.corners.reshape(-1, 3)
+    # What lies at one point has one number; others may have it too, which does no harm.
+    number = points @ np.array([0.6180339887, 1.4142135624, 1.7320508076])
+    order = np.argsort(number, kind="stable")
+    same = np.diff(number[order]) <= 1e-9 * max(1.0, float(np.abs(number).max()))
+    split[order[1:][same]] = split[order[:-1][same]] = True
+    return split
+
+
+def _outwards(boxes: Floats) -> Singles:
     """Boxes in single precision that hold these."""
     rounded = boxes.astype(np.float32)
     for corner, way in ((slice(3), -np.inf), (slice(3, 6), np.inf)):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import (
     CLEARANCE,
@@ -24,6 +24,7 @@ from dmpcli.surfaces.kernels.tree import (
     closest,
     corner,
     flat_normal,
+    in_doubt,
     on_facet,
     outward_of,
     smooth_normal,
@@ -44,11 +45,11 @@ _ROOM = 1e-9
 @kernel
 def _beside(reals: Floats, row: int, k: int, p: Vector) -> float:
     """How far a point lies beyond the line of an edge, in the facet's plane."""
-    return dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k]
+    return float(dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k])
 
 
 @kernel
-def _steepness(reals: Floats, numbers: Integers, row: int, other: int) -> float:
+def _steepness(reals: Floats, numbers: Halves, row: int, other: int) -> float:
     """How steep a facet that shares a corner leaves the plane of another, by the way outwards.
 
     Over any point of it lies at most so much more height over the plane per distance from the
@@ -99,7 +100,7 @@ def _apart(reals: Floats, row: int, other: int) -> float:
 
 
 @kernel
-def _know(facets: Facets, row: int, nodes: Integers) -> None:
+def _know(facets: Facets, row: int, nodes: Halves) -> None:
     """Find clearance and slope of a facet, see `certified`."""
     reals, numbers = facets.reals, facets.numbers
     reach = 2.0 * _NEAR
@@ -144,7 +145,7 @@ def _know(facets: Facets, row: int, nodes: Integers) -> None:
 
 
 @kernel
-def certified(facets: Facets, row: int, height: float, inside: float, nodes: Integers) -> bool:
+def certified(facets: Facets, row: int, height: float, inside: float, nodes: Halves) -> bool:
     """Tell whether the foot of a point within a facet is the closest of the whole mesh.
 
     What shares no corner with the facet is at least its clearance away from it. What shares one
@@ -155,12 +156,12 @@ def certified(facets: Facets, row: int, height: float, inside: float, nodes: Int
     if facets.reals[row, CLEARANCE] < 0.0:
         _know(facets, row, nodes)
     near = 2.0 * height + _ROOM < facets.reals[row, CLEARANCE]
-    return near and inside > height * facets.reals[row, SLOPE] + _ROOM
+    return bool(near and inside > height * facets.reals[row, SLOPE] + _ROOM)
 
 
 @kernel
 def followed(
-    facets: Facets, p: Vector, row: int, nodes: Integers, offs: Floats
+    facets: Facets, p: Vector, row: int, nodes: Halves, offs: Floats
 ) -> tuple[Vector, int]:
     """Closest point of the mesh, and its row, from a facet nearby on."""
     reals = facets.reals
@@ -198,7 +199,10 @@ class Limits(NamedTuple):
 
 
 class Feet(NamedTuple):
-    """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met."""
+    """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met.
+
+    Where there is `doubt` numpy is to decide, on `point` and `way`, e_v unnormalised.
+    """
 
     foot: Floats
     across: Floats
@@ -208,6 +212,9 @@ class Feet(NamedTuple):
     beyond: Booleans
     far: Booleans
     back: Booleans
+    doubt: Booleans
+    point: Floats
+    way: Floats
 
 
 @kernel
@@ -223,27 +230,28 @@ def _slopes(s: float) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _patch(values: Floats, i: int, j: int, r: float, s: float) -> tuple[Vector, Vector]:
-    """Position and unnormalised e_v in a cell of nodes (nu, nv, 12)."""
-    a, b, c, d = _weights(r)
+def _along_u(values: Floats, at: tuple[int, int, int], k: int, r: float) -> tuple[float, float]:
+    """Coordinate k on a line of a cell between two nodes, and its v-slope."""
+    b, i, j = at
+    p, pu, q, qu = _weights(r)
+    value = p * values[b, i, j, k] + q * values[b, i + 1, j, k]
+    value += pu * values[b, i, j, 6 + k] + qu * values[b, i + 1, j, 6 + k]
+    slope = p * values[b, i, j, 3 + k] + q * values[b, i + 1, j, 3 + k]
+    slope += pu * values[b, i, j, 9 + k] + qu * values[b, i + 1, j, 9 + k]
+    return value, slope
+
+
+@kernel
+def _coordinate(
+    values: Floats, at: tuple[int, int, int], k: int, r: float, s: float
+) -> tuple[float, float]:
+    """Coordinate k of a point in a cell, and of the unnormalised e_v there."""
+    near, near_v = _along_u(values, at, k, r)
+    far, far_v = _along_u(values, (at[0], at[1], at[2] + 1), k, r)
     w0, w1, w2, w3 = _weights(s)
     t0, t1, t2, t3 = _slopes(s)
-    p0, p1, q0, q1 = values[i, j], values[i, j + 1], values[i + 1, j], values[i + 1, j + 1]
-    x, y, z, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        near = (a * p0[k] + c * q0[k]) + (b * p0[6 + k] + d * q0[6 + k])
-        near_v = (a * p0[3 + k] + c * q0[3 + k]) + (b * p0[9 + k] + d * q0[9 + k])
-        far = (a * p1[k] + c * q1[k]) + (b * p1[6 + k] + d * q1[6 + k])
-        far_v = (a * p1[3 + k] + c * q1[3 + k]) + (b * p1[9 + k] + d * q1[9 + k])
-        value = w0 * near + w1 * near_v + w2 * far + w3 * far_v
-        slope = t0 * near + t1 * near_v + t2 * far + t3 * far_v
-        if k == 0:
-            x, dx = value, slope
-        elif k == 1:
-            y, dy = value, slope
-        else:
-            z, dz = value, slope
-    return (x, y, z), (dx, dy, dz)
+    value = w0 * near + w1 * near_v + w2 * far + w3 * far_v
+    return value, t0 * near + t1 * near_v + t2 * far + t3 * far_v
 
 
 @kernel
@@ -266,17 +274,25 @@ def lift(
             i = min(max(math.floor(u[b, k]), 0), nu - 1)
             j = min(max(math.floor(v[b, k]), 0), nv - 1)
             r, s = u[b, k] - i, v[b, k] - j
-            p, way = _patch(strip.values[b], i, j, r, s)
+            x, dx = _coordinate(strip.values, (b, i, j), 0, r, s)
+            y, dy = _coordinate(strip.values, (b, i, j), 1, r, s)
+            z, dz = _coordinate(strip.values, (b, i, j), 2, r, s)
+            p, way = (x, y, z), (dx, dy, dz)
             if row < 0:
                 foot, row = closest(facets, p, nodes, offs)
             else:
                 foot, row = followed(facets, p, row, nodes, offs)
+            unsure = in_doubt(facets, p, foot, row)
+            out.doubt[b, k] = unsure
+            if unsure:
+                out.point[b, k, 0], out.point[b, k, 1], out.point[b, k, 2] = p
+                out.way[b, k, 0], out.way[b, k, 1], out.way[b, k, 2] = way
             n = times(sign[b, 0], smooth_normal(facets.reals, foot, row))
             a, c = i + (1 if r > 0.5 else 0), j + (1 if s > 0.5 else 0)
             beyond = facets.numbers[row, PART] != part[b]
             beyond = beyond or beyond_border(facets, p, foot, row, limits.on_border)
-            near = strip.normal[b, a, c]
-            out.back[b, k] = not beyond and dot(n, (near[0], near[1], near[2])) < 0.0
+            near = strip.normal[b, a, c, 0], strip.normal[b, a, c, 1], strip.normal[b, a, c, 2]
+            out.back[b, k] = not beyond and dot(n, near) < 0.0
             allowed = max(facets.reals[row, REACH], limits.landing * strip.away[b, i, j])
             out.far[b, k] = not beyond and length(sub(p, foot)) > allowed
             out.beyond[b, k] = beyond

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import (
     PART,
@@ -10,6 +10,7 @@ from dmpcli.surfaces.kernels.tree import (
     Facets,
     beyond_border,
     closest,
+    in_doubt,
     smooth_normal,
     stack,
 )
@@ -72,30 +73,32 @@ def _probe(
     normal: Vector,
     sign: float,
     part: int,
-    nodes: Integers,
+    nodes: Halves,
     offs: Floats,
-) -> tuple[Vector, bool]:
-    """Normal at the closest point, and whether the surface goes on there."""
+) -> tuple[Vector, bool, bool]:
+    """Normal at the closest point, whether the surface goes on there, and `in_doubt`."""
     foot, row = closest(facets, p, nodes, offs)
     there = times(sign, smooth_normal(facets.reals, foot, row))
     good = dot(there, normal) > limits.sharp and facets.numbers[row, PART] == part
-    return there, good and not beyond_border(facets, p, foot, row, limits.on_border)
+    good = good and not beyond_border(facets, p, foot, row, limits.on_border)
+    return there, good, in_doubt(facets, p, foot, row)
 
 
 @kernel
-def start(facets: Facets, limits: Limits, ahead: Walks, behind: Walks) -> None:
+def start(facets: Facets, limits: Limits, ahead: Walks, behind: Walks, doubt: Booleans) -> None:
     """Find curvature ahead and behind of walks that stand at points of the mesh.
 
     `before` and `trend` of both ways are filled in; position, direction, normal, step, sign and
-    part are read of those ahead.
+    part are read of those ahead. `doubt` tells which walks numpy is to decide about.
     """
     nodes, offs = stack()
     for i in range(len(ahead.position)):
         x, t, n = at(ahead.position, i), at(ahead.direction, i), at(ahead.normal, i)
         h, sign, part = ahead.step[i, 0], ahead.sign[i, 0], ahead.part[i]
         reach = times(h, t)
-        one, here = _probe(facets, limits, add(x, reach), n, sign, part, nodes, offs)
-        other, there = _probe(facets, limits, sub(x, reach), n, sign, part, nodes, offs)
+        one, here, unsure = _probe(facets, limits, add(x, reach), n, sign, part, nodes, offs)
+        other, there, either = _probe(facets, limits, sub(x, reach), n, sign, part, nodes, offs)
+        doubt[i] = unsure or either
         bend_ahead = sub(one, n) if here else sub(n, other)
         bend_behind = sub(n, other) if there else sub(one, n)
         bend, half = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -147,10 +150,13 @@ def _step(
     h: float,
     sign: float,
     part: int,
-    nodes: Integers,
+    nodes: Halves,
     offs: Floats,
-) -> tuple[Vector, Vector, Vector, Vector, float, bool, bool, bool]:
-    """Position, direction, normal, trend and away after a step, and whether off, sharp, back."""
+) -> tuple[Vector, Vector, Vector, Vector, float, bool, bool, bool, bool]:
+    """Position, direction, normal, trend and away after a step.
+
+    And whether it is off, sharp, back, and `in_doubt`.
+    """
     was_off = away > 0.0
     last = sub(n, before)
     slope = trend if was_off else (last[0] / h, last[1] / h, last[2] / h)
@@ -159,6 +165,7 @@ def _step(
     guess = sub(add(x, times(h, t)), times(0.5 * h * h * kappa, n))
     guess = sub(guess, times((h * h * h / 6.0) * kappa, slope))
     foot, row = closest(facets, guess, nodes, offs)
+    doubt = in_doubt(facets, guess, foot, row)
     after = times(sign, smooth_normal(facets.reals, foot, row))
     turn = dot(after, n)
     gap = length(sub(foot, guess))
@@ -176,7 +183,7 @@ def _step(
     else:
         away = 0.0
     position, direction, normal = _corrected(x, t, n, before, h, foot, after)
-    return position, direction, normal, slope, away, off, sharp, back
+    return position, direction, normal, slope, away, off, sharp, back, doubt
 
 
 @kernel
@@ -187,8 +194,12 @@ def ends(
     steps: Integers,
     sharp: Booleans,
     off: Booleans,
+    doubt: Booleans,
 ) -> None:
-    """Walk each walk's steps (M,) in place; note which met a crease, and which were ever off."""
+    """Walk each walk's steps (M,) in place; note which met a crease, and which were ever off.
+
+    What is in doubt is not walked to its end, and stays as it was.
+    """
     nodes, offs = stack()
     for i in range(len(steps)):
         x, t, n = at(walks.position, i), at(walks.direction, i), at(walks.normal, i)
@@ -196,15 +207,19 @@ def ends(
         h, sign, part = walks.step[i, 0], walks.sign[i, 0], walks.part[i]
         for _ in range(steps[i]):
             last = n
-            x, t, n, trend, away, left, crease, _ = _step(
+            x, t, n, trend, away, left, crease, _, unsure = _step(
                 facets, limits, x, t, n, before, trend, away, h, sign, part, nodes, offs
             )
             before = last
             sharp[i] |= crease
             off[i] |= left
-        put(walks.position, i, x)
-        put(walks.direction, i, t)
-        put(walks.normal, i, n)
+            if unsure:
+                doubt[i] = True
+                break
+        if not doubt[i]:
+            put(walks.position, i, x)
+            put(walks.direction, i, t)
+            put(walks.normal, i, n)
 
 
 @kernel
@@ -217,8 +232,12 @@ def lines(
     first: int,
     way: int,
     out: Nodes,
+    doubt: Booleans,
 ) -> None:
-    """Walk `counts` nodes of each walk, and put them beside node `first` of its row of `out`."""
+    """Walk `counts` nodes of each walk, and put them beside node `first` of its row of `out`.
+
+    What is in doubt is not walked to its end.
+    """
     nodes, offs = stack()
     for i in range(len(rows)):
         row = rows[i]
@@ -227,7 +246,7 @@ def lines(
         h, sign, part = walks.step[i, 0], walks.sign[i, 0], walks.part[i]
         for k in range(1, counts[row] + 1):
             last = n
-            x, t, n, trend, away, _, crease, back = _step(
+            x, t, n, trend, away, _, crease, back, unsure = _step(
                 facets, limits, x, t, n, before, trend, away, h, sign, part, nodes, offs
             )
             before = last
@@ -237,3 +256,6 @@ def lines(
             put(out.normal[row], node, n)
             out.away[row, node] = away
             out.sharp[row, node], out.back[row, node] = crease, back
+            if unsure:
+                doubt[i] = True
+                break

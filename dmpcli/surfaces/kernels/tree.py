@@ -9,11 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Floats, Halves, Integers, Singles
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
 
 _LEAF = 4
+_SPLIT = 64
+_ON = 1e-9
+"""A foot this near to an edge of its facet may as well lie on the next one, mm."""
+_REACH = 0.29**2
+"""Points nearer to the mesh than this, mm², are within reach of any of its facets."""
 _BALL = 0.2**2
 """A point that was predicted lies nearer to the mesh than this, mm², or is looked for anywhere."""
 
@@ -36,13 +41,14 @@ class Facets(NamedTuple):
         then, once known, what `samples.certified` asks: `CLEARANCE`, mm (-1 before), and `SLOPE`.
     numbers : array of int32, shape (m, 16)
         From 0: `Topology.neighbours`, in the tree's order; `FLAGS`: bits 0 to 2 are edges of the
-        border, 3 to 5 corners of it; `PART`: component; `FACE`: the mesh's own number; `VERTICES`.
+        border, 3 to 5 corners of it, 6: see `in_doubt`; `PART`: component; `FACE`: the mesh's own
+        number; `VERTICES`.
     """
 
-    boxes: Floats
-    first: Integers
+    boxes: Singles
+    first: Halves
     reals: Floats
-    numbers: Integers
+    numbers: Halves
 
 
 NORMAL, MAP, EDGES, REACH, CLEARANCE, SLOPE, REALS = 9, 12, 24, 36, 37, 38, 40
@@ -50,7 +56,7 @@ FLAGS, PART, FACE, VERTICES, NUMBERS = 3, 4, 5, 6, 16
 
 
 @kernel
-def _select(order: Integers, keys: Floats, low: int, high: int, middle: int) -> None:
+def _select(order: Halves, keys: Floats, low: int, high: int, middle: int) -> None:
     """Part order[low:high] so that no key before `middle` is larger than one from there on."""
     high -= 1
     while low < high:
@@ -76,7 +82,7 @@ def _select(order: Integers, keys: Floats, low: int, high: int, middle: int) -> 
 
 
 @kernel
-def ordered(corners: Floats, depth: int) -> tuple[Integers, Integers]:
+def ordered(corners: Floats, depth: int) -> tuple[Halves, Halves]:
     """Order of the facets (m, 3, 3) in a tree of so many levels below its root, and its leaves."""
     m = len(corners)
     middles = np.empty((3, m))
@@ -116,7 +122,7 @@ def depth_of(count: int) -> int:
 
 
 @kernel
-def boxes_of(reals: Floats, first: Integers) -> Floats:
+def boxes_of(reals: Floats, first: Halves) -> Floats:
     """Boxes of all nodes."""
     leaves = len(first) - 1
     boxes = np.empty((2 * leaves - 1, 6))
@@ -232,12 +238,12 @@ def on_facet(reals: Floats, row: int, p: Vector) -> Vector:
 
 
 @kernel
-def _off_box(boxes: Floats, node: int, p: Vector) -> float:
+def _off_box(boxes: Singles, node: int, p: Vector) -> float:
     """Squared distance of a point from a box."""
     x = max(boxes[node, 0] - p[0], p[0] - boxes[node, 3], 0.0)
     y = max(boxes[node, 1] - p[1], p[1] - boxes[node, 4], 0.0)
     z = max(boxes[node, 2] - p[2], p[2] - boxes[node, 5], 0.0)
-    return x * x + y * y + z * z
+    return float(x * x + y * y + z * z)
 
 
 @kernel
@@ -246,12 +252,12 @@ def _lower(reals: Floats, row: int, p: Vector) -> float:
     off = abs(dot(flat_normal(reals, row), sub(p, corner(reals, row, 0))))
     for k in range(3):
         off = max(off, dot(outward_of(reals, row, k), p) - reals[row, EDGES + 9 + k])
-    return off * off
+    return float(off * off)
 
 
 @kernel
 def _within(
-    facets: Facets, p: Vector, bound: float, nodes: Integers, offs: Floats
+    facets: Facets, p: Vector, bound: float, nodes: Halves, offs: Floats
 ) -> tuple[Vector, int]:
     """Closest point nearer than a squared bound, and its row; -1 without one."""
     best, foot, row = bound, p, -1
@@ -290,18 +296,35 @@ def _within(
 
 
 @kernel
-def stack() -> tuple[Integers, Floats]:
+def stack() -> tuple[Halves, Floats]:
     """Room for one search after another."""
     return np.empty(64, dtype=np.int32), np.empty(64)
 
 
 @kernel
-def closest(facets: Facets, p: Vector, nodes: Integers, offs: Floats) -> tuple[Vector, int]:
+def closest(facets: Facets, p: Vector, nodes: Halves, offs: Floats) -> tuple[Vector, int]:
     """Closest point of the mesh, and its row."""
     foot, row = _within(facets, p, _BALL, nodes, offs)
     if row < 0:
         foot, row = _within(facets, p, np.inf, nodes, offs)
     return foot, max(row, 0)
+
+
+@kernel
+def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
+    """Tell whether it matters which facet a point of the mesh is taken to lie on, and is chance.
+
+    At creases, where sheets touch, and far off the mesh the answer hangs on which of several facets
+    at the same distance a search comes upon. Then numpy's way decides, so that both ways agree.
+    """
+    gap = sub(p, foot)
+    if not facets.numbers[row, FLAGS] & _SPLIT and dot(gap, gap) < _REACH:
+        return False
+    for k in range(3):
+        beside = dot(outward_of(facets.reals, row, k), foot) - facets.reals[row, EDGES + 9 + k]
+        if beside > -_ON:
+            return True
+    return False
 
 
 @kernel
@@ -320,7 +343,7 @@ def search(facets: Facets, points: Floats) -> tuple[Floats, Integers]:
 def beyond_border(facets: Facets, p: Vector, foot: Vector, row: int, least: float) -> bool:
     """Tell whether a point lies beside the mesh; see `TriangleMesh.beyond_border`."""
     reals, flags = facets.reals, facets.numbers[row, FLAGS]
-    if flags == 0:
+    if flags & 63 == 0:
         return False
     gap, n = sub(p, foot), flat_normal(reals, row)
     if length(sub(gap, times(dot(gap, n), n))) <= least:

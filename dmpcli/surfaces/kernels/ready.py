@@ -1,0 +1,71 @@
+"""All kernels that a job needs, compiled before it begins: then its processes only load them."""
+
+import numpy as np
+
+from dmpcli.spatial import rotations
+from dmpcli.spatial.kernels import euler_of_products
+from dmpcli.surfaces.kernels import facet_walks, samples, smoothing, stepping, tree
+from dmpcli.surfaces.kernels.mesh import Geometry, compiled
+
+_ENTRIES = (
+    tree.ordered,
+    tree.boxes_of,
+    tree.fill,
+    stepping.start,
+    stepping.ends,
+    stepping.lines,
+    samples.lift,
+    facet_walks.run,
+    smoothing.smoothed,
+    euler_of_products,
+)
+
+
+def files() -> list[tuple[str, str]]:
+    """Folder where each kernel is kept, and what the names of its files hold; empty where none."""
+    found = []
+    for entry in _ENTRIES:
+        stats, name = getattr(entry, "stats", None), getattr(entry, "__name__", "")
+        found.append((getattr(stats, "cache_path", None) or "", f".{name}-"))
+    return found
+
+
+def load() -> None:
+    """Call each kernel once, on the least that there is: two facets, nothing to walk."""
+    corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    faces = np.array([[0, 1, 2], [1, 3, 2]])
+    n = np.tile([0.0, 0.0, 1.0], (2, 1))
+    none = np.zeros((2, 3), dtype=bool)
+    facets = compiled(
+        Geometry(
+            faces,
+            corners,
+            n,
+            np.repeat(n[:, None], 3, axis=1),
+            np.ones(2),
+            np.zeros(2, dtype=np.int64),
+            np.array([[-1, 1, -1], [-1, -1, 0]]),
+            none,
+            np.zeros(4, dtype=bool),
+        )
+    ).facets
+    v, one, number, mark = np.empty((0, 3)), np.empty((0, 1)), np.empty(0, np.int64), none[:0, 0]
+    walks = stepping.Walks(v, v, v, v, one, one, number, v, one[:, 0])
+    limits = stepping.Limits(0.9, -0.5, 0.3, 0.05, 0.01)
+    stepping.start(facets, limits, walks, walks, mark)
+    stepping.ends(facets, limits, walks, number, mark, mark, mark)
+    line = np.empty((0, 1, 3))
+    nodes = stepping.Nodes(line, line, line, one, none[:0, :1], none[:0, :1])
+    stepping.lines(facets, limits, walks, number, number, 0, 1, nodes, mark)
+    cell = np.empty((0, 2, 2))
+    strip = samples.Strip(np.empty((0, 2, 2, 12)), np.empty((0, 2, 2, 3)), cell, cell)
+    flat, flags = np.empty((0, 1)), none[:0, :1]
+    feet = samples.Feet(
+        line, line, line, flat.astype(np.int64), flat, flags, flags, flags, flags, line, line
+    )
+    where = samples.Limits(0.01, 0.05)
+    samples.lift(facets, strip, flat, flat, one, number, where, feet)
+    facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)
+    frame = np.tile(np.eye(3), (1, 3, 1, 1))
+    smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1)
+    rotations.euler_of_paths(frame[:, :1], frame)

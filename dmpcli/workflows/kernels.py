@@ -1,0 +1,101 @@
+"""By what means a job is drawn: compiled kernels, or numpy; chosen once, and then kept to.
+
+Both give the same strokes but for the last bits, so one job has one means, for all its parts and
+whoever draws them. It is told by the job as a whole, never by the size of a part: a table of so
+many rows, by whether the extra is here, or by what the folder says that is gone on with.
+"""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dmpcli import extras
+from dmpcli.dmp.options import Kernels, Means
+from dmpcli.errors import InputError
+from dmpcli.messages import tell
+from dmpcli.records import file_io, record
+
+MANY_ON_MESH = 1000
+"""Rows from which kernels bring more than loading them costs, on meshes ..."""
+
+MANY_ON_EACH = 100
+"""... and on each, in the mean, where a table names them: its facets must be made ready ..."""
+
+MANY = 30_000
+"""... and on other surfaces, where only the tool's turn is theirs."""
+
+OPTION = "kernels"
+"""Their name in the options of a job that is drawn with them; numpy leaves no trace."""
+
+
+def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Path) -> Means:
+    """Choose the means of a job.
+
+    Parameters
+    ----------
+    asked : {'auto', 'compiled', 'pure'}
+    rows : int
+        Of the whole table, whatever share of it is drawn here.
+    mesh : bool
+        Whether strokes may lie on meshes.
+    turning : bool
+        Whether their tools turn with a surface.
+    output : Path
+        The job's folder: what was begun there goes on as it was.
+
+    Raises
+    ------
+    InputError
+        Kernels are asked for, or were used in the folder, and numba is not here.
+    """
+    if asked == "compiled":
+        extras.load(extras.FAST, "--kernels compiled", "numba")
+        return "compiled"
+    if asked == "pure":
+        return "pure"
+    before = recorded(output)
+    if before is not None:
+        if before == "compiled" and not there():
+            raise InputError(
+                f"{output}: was begun with --kernels compiled, which needs numba, not installed "
+                f"here: {extras.FAST.install}, or give --kernels pure to draw it anew"
+            )
+        return before
+    many = (mesh and rows >= MANY_ON_MESH) or (turning and rows >= MANY)
+    return "compiled" if many and there() else "pure"
+
+
+def there() -> bool:
+    """Tell whether kernels can be compiled here, without loading what does it."""
+    return importlib.util.find_spec("numba") is not None
+
+
+def recorded(output: Path) -> Means | None:
+    """Means of the parts that a folder holds; None where there are none that tell."""
+    for name in sorted(file_io.parts_of(output)) if output.is_dir() else ():
+        try:
+            footer = pq.read_metadata(output / name)
+            options = json.loads((footer.metadata or {})[record.KEY])["options"]
+            return "compiled" if options.get(OPTION) == "compiled" else "pure"
+        except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
+            continue
+    return None
+
+
+def kept() -> bool:
+    """Tell whether what an earlier run compiled is there, as far as names tell."""
+    from dmpcli.surfaces.kernels import ready
+
+    return all(folder and any(Path(folder).glob(f"*{name}*.nbi")) for folder, name in ready.files())
+
+
+def get_ready() -> None:
+    """Load the kernels of a job, or compile them; say so where it takes time."""
+    from dmpcli.surfaces.kernels import ready
+
+    if not kept():
+        tell("kernels are compiled, once on this machine; it takes some 20 s of a processor")
+    ready.load()

@@ -1,0 +1,170 @@
+"""Plans and what is checked of them: results that are kept, see `tests/kept.py`."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmpcli.errors import DmpError
+from dmpcli.kinematics import models
+from dmpcli.kinematics.reachability import Reach
+from dmpcli.planning import deceleration, plan, preflight, transfers
+from dmpcli.planning.limits import Limits
+from dmpcli.planning.spline import between, spline, window
+from dmpcli.spatial import rotations
+from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, stroke
+from tests.kept import Kept
+
+KEPT = Kept(__file__)
+TIGHT = Limits(20.0, 30.0, 300.0, 0.1, 0.2, 1.0, (-650.0, -540.0, 100.0, 150.0, -30.0, 0.0))
+UP = (0.0, 0.0, 1.0)
+
+
+def turned(by):
+    return rotations.exp(np.array(by)) @ PEN_DOWN
+
+
+def strokes():
+    """Strokes of several rates and durations, with and without orientation, normal and force."""
+    made = [stroke(2.0, 40.0, 0.8, normal=UP), stroke(3.0, 73.0, rotated=False), stroke(1.0, 8.0)]
+    made.append(replace(made[0], force=2.0 + np.sin(np.arange(len(made[0].t)))))
+    made.append(replace(made[1], t=made[1].t ** 1.1, first_row=7))
+    return made
+
+
+def poses():
+    return [
+        (START, PEN_DOWN),
+        (START + [30.0, -40.0, 20.0], turned([0.1, 0.0, 0.4])),
+        (START, turned([0.0, 0.2, 0.0])),
+    ]
+
+
+@KEPT.case
+def plans_of_strokes():
+    found = []
+    for source in strokes():
+        for period, speed in ((0.02, 1.0), (0.008, 0.5), (0.05, 0.25)):
+            for start in poses():
+                one = plan.make(source, period, speed, WIDE, start, 25.0)
+                index = (0.0, 3.4, one.lead + 0.5, len(one) - 1.0)
+                found += [
+                    one,
+                    one.sizes,
+                    [one.at(i) for i in index],
+                    [one.time_at(i) for i in index],
+                    [one.phase_at(i) for i in index],
+                    [one.draws_at(i) for i in index],
+                ]
+                if one.normal is not None:
+                    found.append([one.normal_at(i) for i in index])
+    return found
+
+
+@KEPT.case
+def straight_ways():
+    found = [plan.gap(a, b) for a in poses() for b in poses()]
+    for limits in (WIDE, TIGHT):
+        for speed in (5.0, 60.0):
+            for start in poses()[1:]:
+                for spare in (0.0, 0.3):
+                    way = plan.straight("approach", start, poses()[0], 0.02, limits, speed, spare)
+                    found += [way]
+    return found
+
+
+@KEPT.case
+def checks_before_the_start():
+    found = []
+    for source in strokes():
+        for limits in (WIDE, TIGHT):
+            one = plan.make(source, 0.02, 1.0, limits, poses()[1], 25.0)
+            for check in (
+                *preflight.within_limits(one, source, limits),
+                *preflight.at_rest(source, 1.0, 0.02, limits),
+            ):
+                found += [replace(check, remedy=""), check.passed]
+    for d, a in ((0.1, 0.01), (3.0, 0.2)):
+        found += [replace(c, remedy="") for c in preflight.near_start(d, a, 0.5, 0.05)]
+    return found
+
+
+@KEPT.case
+def checks_of_joints():
+    found = []
+    reach = Reach(models.model("ec66"))
+    source = stroke(2.0, 50.0, 0.4)
+    for by in ([0, 0, 0], [-450, 0, 0], [100, -80, 60]):
+        moved = replace(source, position=source.position + np.array(by, dtype=float))
+        one = plan.make(moved, 0.02, 1.0, WIDE, (moved.position[0], moved.rotation[0]), 25.0)
+        checks, joints = preflight.by_joints(one, moved, reach, None)
+        found += [[replace(c, remedy="") for c in checks], joints]
+    return found
+
+
+@KEPT.case
+def ways_between_strokes():
+    a = stroke(2.0, 50.0, 0.3, normal=UP)
+    many = [
+        a,
+        replace(a, position=a.position + [40.0, 90.0, 5.0]),
+        replace(a, position=a.position[::-1].copy() + [0.0, -60.0, 0.0], normal=None),
+    ]
+    found = []
+    ways = (
+        transfers.TransferOptions(20.0, 100.0, 50.0, 20.0),
+        transfers.TransferOptions(8.0, 60.0, 30.0, 10.0, 4, 0.1),
+    )
+    for one in ways:
+        for start, near in ((poses()[0], True), (poses()[1], False)):
+            for approach in (None, 15.0):
+                made = transfers.plans(many, 0.02, 1.0, WIDE, start, near, one, approach)
+                found += [[p.lead, p.last, p.legs, p.id, p.position, p.rotation, p.t] for p in made]
+        level = transfers.height(many, PEN_DOWN, one.clearance)
+        found += [
+            level,
+            level.over(START),
+            level.over(START, 4.0),
+            transfers.height(many[:1], PEN_DOWN, 9.0, (0,)),
+        ]
+    return [*found, [transfers.off(s, PEN_DOWN, e) for s in many for e in (0, -1)]]
+
+
+@KEPT.case
+def ramps_and_splines():
+    found = [[deceleration.progress(t, 0.7) for t in (0.0, 0.1, 0.4, 0.9)]]
+    found.append(
+        [
+            deceleration.duration(v, a, 2250.0, j)
+            for v in (5.0, 100.0)
+            for a in (0.0, 2000.0)
+            for j in (1e3, 5e4)
+        ]
+    )
+    t = np.cumsum(1.0 + 0.5 * np.sin(np.arange(30.0)))
+    y = np.column_stack([np.sin(t), t**1.5])
+    curve = spline(t, y)
+    found += [curve, curve(np.linspace(t[0] - 1.0, t[-1] + 1.0, 70))]
+    for index in (0.0, 2.25, 28.9):
+        near, share = window(index, 30)
+        found += [near, share, between(y[near], share)]
+    return found
+
+
+@KEPT.case
+def what_no_plan_is_made_of():
+    a = stroke(2.0, 50.0, 0.3, normal=UP)
+    found = []
+    for change in ({"t": a.t * 1e5}, {"normal": None}, {"rotation": None}, {"force": a.t}):
+        for start in poses()[:2]:
+            try:
+                one = plan.make(replace(a, **change), 0.02, 1.0, WIDE, start, 25.0)
+                found += [len(one), one.oriented, one.normal is None, one.force]
+            except DmpError as error:
+                found.append(type(error).__name__)
+    return found
+
+
+@pytest.mark.parametrize("name", KEPT.cases)
+def test_results_are_those_that_were_kept(name):
+    KEPT.check(name)
