@@ -57,7 +57,6 @@ def test_the_report_measures_a_stroke_against_the_goal_that_it_was_led_to(traj, 
     execute(traj, "-o", out, "--goal-from", goals, "-q")
     (row,) = json.loads(ended("report", out, "--json").stdout)["files"][0]["strokes"]
     np.testing.assert_allclose(row["goal"], [-665.0, 125.0, -17.56], atol=1e-9)
-    assert row["goal_error"] < 0.05
 
 
 def test_pressed_the_goal_moves_along_the_plane_and_the_force_is_held(traj, goals, tmp_path):
