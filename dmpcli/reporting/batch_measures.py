@@ -374,11 +374,12 @@ class _Block:
         )
         for key, values in lies.figures.items():
             column[f"surface_{key}"][:] = values
-        # On a curved surface waves are measured, and strokes compared, along it.
-        if self._curved():
-            waves = lies.waves
+        # Without a plane waves are measured, and strokes compared, along the surface.
+        along = ~self.known | self._curved()
+        if along.any():
+            waves = _chosen_waves(waves, lies.waves, along)
             column["wave_height"][:], column["wave_spread"][:] = waves.mean, waves.spread
-            self._compare_along(column, lies)
+            self._compare_along(column, lies, along)
         return MeasuredBlock(self.rows, self.role, table, self.t, waves, self._placed_stroke)
 
     def _curved(self) -> bool:
@@ -455,16 +456,18 @@ class _Block:
         column["phase_rms"][which] = found.phase_rms
         column["phase_max"][which] = found.phase_max
 
-    def _compare_along(self, column: dict[str, Floats], lies: placed_block.PlacedBlock) -> None:
-        """Compare strokes with the demonstration along the surface, where they have a chart."""
+    def _compare_along(
+        self, column: dict[str, Floats], lies: placed_block.PlacedBlock, along: Booleans
+    ) -> None:
+        """Compare some strokes with the demonstration along the surface, if they have a chart."""
         at = self.sight.reference
         if at is None:
             return
         for name in ("nearest_rms", "nearest_max", "phase_rms", "phase_max"):
-            column[name][:] = np.nan
+            column[name][along] = np.nan
         if at.closed:
             return
-        charted = lies.charted
+        charted = lies.charted & along
         stretch = lies.lengths[charted] / at.length
         self._compare(column, charted, lies.place[:, charted], stretch)
 
@@ -513,3 +516,18 @@ class _Block:
             turn=self.sight.drawn.turn,
             mark=tolerance_mark.of_facts(self.facts),
         )
+
+
+def _chosen_waves(first: ManyWaves, second: ManyWaves, which: Booleans) -> ManyWaves:
+    """Return the waves of the second where `which` (B,) says so, else those of the first."""
+    own = ~which[first.stroke], which[second.stroke]
+    stroke, index, value = (
+        np.concatenate([a[own[0]], b[own[1]]])
+        for a, b in (
+            (first.stroke, second.stroke),
+            (first.index, second.index),
+            (first.value, second.value),
+        )
+    )
+    order = np.argsort(stroke, kind="stable")
+    return ManyWaves(first.count, stroke[order], index[order], value[order])
