@@ -10,6 +10,7 @@ from dmpcli.errors import InputError
 from dmpcli.messages import on_terminal
 from dmpcli.settings.options import with_options
 from dmpcli.settings.recording import RecordingOptions
+from dmpcli.settings.report import ReportOptions
 
 
 @with_options
@@ -62,9 +63,7 @@ def command(
         bool,
         typer.Option("--paper", help="The paper's tables beside ours, and with -o its figures."),
     ] = False,
-    jobs: Annotated[
-        int, typer.Option(min=1, max=1024, help="Processes that measure large batches.")
-    ] = 1,
+    wanted: ReportOptions,
     form: RecordingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of the tables.")
@@ -89,7 +88,7 @@ def command(
         from dmpcli.reporting.turnable import check
 
         check()
-    if jobs > 1:
+    if wanted.jobs > 1:
         from dmpcli.batch import process_pool
 
         process_pool.begin()
@@ -104,7 +103,7 @@ def command(
         grounds = SiteGrounds(pairs, otherwise, surface_cache)
     elif surface is not None:
         read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output, grounds, paper, view, png, jobs)
+    made = report(files, None, layout, read, output, grounds, paper, view, png, wanted.jobs)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
     if show and output is not None:
         typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))

@@ -93,7 +93,7 @@ def placed(
     lengths, uv = _coordinates(
         block, surface, ends.position, sign * ends.normal[:, 0], hits.position
     )
-    charted: Booleans = np.asarray(np.isfinite(uv).all(axis=(0, 2)))
+    charted: Booleans = np.logical_and.reduce(np.isfinite(uv), axis=(0, 2))
     height = measure.heights(block.position, hits.position, normal)
     off = np.zeros(height.shape)
     length_change = np.full(len(lengths), np.nan)

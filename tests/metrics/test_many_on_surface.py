@@ -50,8 +50,11 @@ def test_lengths_tilts_and_heights_are_those_of_each_stroke(seed):
     tilts = many.tilts(-rotation[..., 2], normal)
     stretched = many.stretched_lengths(foot[0, :, :2], np.array([0.5, 2.0]))
     for i in range(3):
-        there = foot[i], normal[i]
-        wanted = one.height(position[i], lambda _: there)  # noqa: B023
+
+        def there(_, found=(foot[i], normal[i])):
+            return found
+
+        wanted = one.height(position[i], there)
         np.testing.assert_allclose(heights[i], wanted, atol=1e-12)
         np.testing.assert_allclose(tilts[i], one.tilt(rotation[i], normal[i]), atol=1e-12)
         steps = np.linalg.norm(np.diff(foot[i], axis=0), axis=1)
