@@ -96,5 +96,12 @@ class FakeClient:
 )
 def test_workers_that_would_draw_other_bytes_are_refused_by_name(client, message, tmp_path):
     with pytest.raises((InputError, InstrumentError), match=message):
-        cluster._check(client, "tcp://x:1", tmp_path)
+        cluster._check(client, "tcp://x:1", tmp_path, kernels=False)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_worker_without_the_kernels_of_the_job_is_refused_by_name(tmp_path):
+    client = FakeClient(["w"], cluster.versions())
+    cluster._check(client, "tcp://x:1", tmp_path, kernels=False)
+    with pytest.raises(InputError, match="worker w has numba None"):
+        cluster._check(client, "tcp://x:1", tmp_path, kernels=True)
