@@ -51,6 +51,7 @@ def test_the_predicted_bound_is_where_a_loop_in_continuous_time_begins_to_grow(s
         assert (swing[-100:].max() > swing[100:200].max()) == grows
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 200.0), st.floats(0.01, 0.4), st.sampled_from([0.004, 0.01, 0.02, 0.04]))
 def test_gains_by_the_rule_are_stable_with_some_to_spare(stiffness, delay, period):
     gains = by_rule(stiffness, delay + period / 2.0, period)

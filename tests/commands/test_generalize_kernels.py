@@ -88,6 +88,7 @@ def test_a_job_that_goes_on_keeps_to_its_means_and_takes_the_parts_that_are_ther
     assert drawn(learned, shop, folder) == other
 
 
+@pytest.mark.slow
 def test_small_tables_and_single_strokes_are_drawn_without_kernels(
     learned, shop, tmp_path, monkeypatch
 ):

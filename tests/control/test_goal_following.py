@@ -129,6 +129,7 @@ moves = st.lists(
 ).map(lambda found: sorted(found, key=lambda one: one[0]))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(moves)
 def test_however_the_goal_jumps_no_limit_breaks_and_the_last_one_taken_is_reached(

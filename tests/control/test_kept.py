@@ -244,6 +244,7 @@ def what_is_meant_where_nothing_is_said():
     return [ContactPolicy(5.0), StopLimits(1.0, 2.0, 3.0, 4.0), LawState(), model.Bounds()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):
     KEPT.check(name)

@@ -176,6 +176,7 @@ def test_ctrl_c_ends_the_run_and_the_view_with_it(tmp_path):
     assert "Traceback" not in text
 
 
+@pytest.mark.slow
 def test_into_a_pipe_nothing_is_drawn(tmp_path):
     written(tmp_path / "traj.parquet", columns(duration=2.0))
     done = subprocess.run(

@@ -67,6 +67,7 @@ def test_noise_of_the_sensor_is_smoothed_away():
     assert np.sqrt(np.mean((skill.taught_force(t) - taught(t)) ** 2)) < 0.05
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     st.integers(2, 30),

@@ -1048,6 +1048,7 @@ def what_is_meant_where_nothing_is_said():
     return [*found, [demonstrations.through(t[:n], t[:n, None]).k for n in range(2, 10)]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):
     KEPT.check(name)

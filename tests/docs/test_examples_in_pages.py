@@ -136,6 +136,7 @@ def test_lines_that_run_elsewhere_are_few_and_named():
     assert sum(not line.startswith(tuple(ELSEWHERE)) for line in typed) > 50
 
 
+@pytest.mark.slow
 def test_the_tutorial_goes_from_a_clone_to_a_page_in_eight_commands(shared, monkeypatch):
     monkeypatch.chdir(shared)
     typed = lines(blocks(ROOT / "docs" / "tutorial.md", "sh")[0])

@@ -22,6 +22,7 @@ def hold(seeds):
     assert not broken, "\n".join(map(told, broken))
 
 
+@pytest.mark.slow
 def test_invariants_hold_whatever_fails():
     hold(FEW)
 
@@ -39,6 +40,7 @@ def test_these_seeds_put_on_every_kind_of_fault_and_run_every_command():
     assert len({(command, kind) for command, kinds in drawn for kind in kinds}) > 125
 
 
+@pytest.mark.slow
 def test_without_faults_every_command_is_done():
     commands = ("execute", MOVED, "execute felt", "execute pressed", "execute file", "record")
     for command in commands:

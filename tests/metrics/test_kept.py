@@ -156,6 +156,7 @@ def contacts_and_times():
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):
     KEPT.check(name)

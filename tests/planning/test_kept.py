@@ -165,6 +165,7 @@ def what_no_plan_is_made_of():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):
     KEPT.check(name)

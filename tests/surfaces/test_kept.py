@@ -592,6 +592,7 @@ def lines_shot():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):
     KEPT.check(name)

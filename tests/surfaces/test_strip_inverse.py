@@ -78,6 +78,7 @@ def test_positions_far_off_the_mesh_are_left_to_the_search(bumpy):
     np.testing.assert_allclose(invert(charts, drawn.position).coordinates, wanted, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facets(ball):
     charts = laid(ball, headings=2, half=40.0, top=95.0)
     drawn = charts.lift(wave(charts, wide=12.0)).position

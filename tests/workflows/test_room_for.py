@@ -35,6 +35,7 @@ def proposed(part="part.stl"):
     return said["told"], [one[1].split() for one in found if one]
 
 
+@pytest.mark.slow
 def test_what_is_proposed_is_drawn(folder):
     _, ways = proposed()
     assert ways
@@ -45,6 +46,7 @@ def test_what_is_proposed_is_drawn(folder):
     assert np.linalg.norm(goal - start) == pytest.approx(90.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_where_no_patch_is_wide_enough_it_says_how_much_is_needed(folder):
     V, F = box((120.0, 20.0, 15.0))
     (folder / "narrow.stl").write_bytes(written(V - V.min(axis=0), F, "stl"))
