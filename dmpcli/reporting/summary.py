@@ -1,12 +1,14 @@
 """A report in plain words: what was drawn, on what, and how well."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from dmpcli.reporting.stroke_measures import Row
 
 SMALL = 0.01
 """Distances below this are not told more closely, mm."""
+FEW = 4
+"""So many strokes of a file are told one by one; more that are alike are told together."""
 
 _WHAT = {
     "demonstration": "a demonstration",
@@ -22,7 +24,7 @@ def sentences(report: Mapping[str, Any]) -> list[str]:
     """Return what there is to say of the document, a sentence or two for each stroke."""
     said = [_on_what(report)] if report["files"] else []
     for entry in report["files"]:
-        said += [_stroke(row, report["reference"]) for row in entry["strokes"]]
+        said += _strokes(entry, report["reference"])
         if entry["statistics"]:
             said.append(_many(entry))
         if entry["states"]:
@@ -52,26 +54,112 @@ def _on_what(report: Mapping[str, Any]) -> str:
     return f"{where} There is no demonstration to compare them with."
 
 
-def _stroke(row: Row, reference: str | None) -> str:
-    what = _WHAT.get(row["role"], str(row["role"]))
-    if row["simulated"]:
-        what += ", in simulation"
-    gap = sum((a - b) ** 2 for a, b in zip(row["start"], row["goal"], strict=True)) ** 0.5
-    shape = "a closed stroke" if row["closed"] else f"from start to goal {gap:.1f} mm"
+def _strokes(entry: Row, reference: str | None) -> list[str]:
+    rows = entry["strokes"]
+    kinds = {(row["role"], row["simulated"], row["closed"], bool(row["surface"])) for row in rows}
+    if len(rows) > FEW and len(kinds) == 1 and reference not in {row["stroke"] for row in rows}:
+        return [_together(entry["file"], rows)]
+    return [_stroke(row, reference) for row in rows]
+
+
+def _together(file: str, rows: Sequence[Row]) -> str:
+    """Tell strokes that are alike by the range of each figure, and the worst by its name."""
+    first = rows[0]
+    gaps = f"from start to goal {_range(map(_gap, rows), 1)} mm"
+    shape = "closed strokes" if first["closed"] else gaps
     text = (
-        f"{row['stroke']}: {what}; {shape}, {row['duration']:.1f} s, path {row['length']:.1f} mm."
+        f"{file}: {len(rows)} strokes, {_what(first)}; {shape}, "
+        f"{_range((row['duration'] for row in rows), 1)} s, "
+        f"paths of {_range((row['length'] for row in rows), 1)} mm."
+    )
+    waves = [height for height in map(_height, rows) if height is not None]
+    if waves:
+        along = ", measured along the surface" if all(map(_along, rows)) else ""
+        text += f" Their waves are {_range(waves, 2)} mm high{along}."
+    off = {row["stroke"]: row["deviation"]["nearest_max"] for row in rows if row["deviation"]}
+    if off:
+        text += (
+            " With start and goal laid upon each other they stay within "
+            f"{_worst(off)} of the demonstrated shape."
+        )
+    ends = {row["stroke"]: max(errors) for row in rows if (errors := _errors(row))}
+    if ends:
+        text += f" They begin and end {_within(ends)} off where they should."
+    if first["surface"]:
+        text += _lie({row["stroke"]: row["surface"] for row in rows})
+    return text
+
+
+def _lie(along: Mapping[str, Any]) -> str:
+    text = (
+        " They lie within "
+        f"{_worst({name: one['distance_max'] for name, one in along.items()})} of the surface"
+    )
+    touching = {name: one["contact_share"] for name, one in along.items()}
+    least = min(touching, key=lambda name: touching[name])
+    if touching[least] < 1.0:
+        text += (
+            f", touching it over {100.0 * touching[least]:.0f} % of the path or more "
+            f"(least: {least})"
+        )
+    tilts = {name: one["tilt_max"] for name, one in along.items() if one["tilt_max"] is not None}
+    if tilts:
+        most = max(tilts, key=lambda name: tilts[name])
+        text += f"; the tool leans up to {tilts[most]:.1f}° off its normal (most: {most})"
+    return f"{text}."
+
+
+def _range(values: Iterable[float], places: int) -> str:
+    told = sorted({f"{value:.{places}f}" for value in values}, key=float)
+    return told[0] if len(told) == 1 else f"{told[0]} to {told[-1]}"
+
+
+def _worst(values: Mapping[str, float]) -> str:
+    most = max(values, key=lambda name: values[name])
+    told = distance(values[most])
+    return told if values[most] < SMALL else f"{told} (most: {most})"
+
+
+def _within(values: Mapping[str, float]) -> str:
+    return _worst(values) if max(values.values()) < SMALL else f"up to {_worst(values)}"
+
+
+def _what(row: Row) -> str:
+    what = _WHAT.get(row["role"], str(row["role"]))
+    return f"{what}, in simulation" if row["simulated"] else what
+
+
+def _gap(row: Row) -> float:
+    """Return the distance from start to goal, mm."""
+    return float(sum((a - b) ** 2 for a, b in zip(row["start"], row["goal"], strict=True)) ** 0.5)
+
+
+def _stroke(row: Row, reference: str | None) -> str:
+    shape = "a closed stroke" if row["closed"] else f"from start to goal {_gap(row):.1f} mm"
+    text = (
+        f"{row['stroke']}: {_what(row)}; {shape}, {row['duration']:.1f} s, "
+        f"path {row['length']:.1f} mm."
     )
     parts = [part for part in (_wave(row), _off(row, reference), _ends(row), _lies(row)) if part]
     return " ".join([text, *parts])
 
 
 def _wave(row: Row) -> str:
-    along = row["surface"] or {}
-    mean = along.get("wave_height")
-    if mean is not None:
-        return f"Its waves are {mean:.2f} mm high, measured along the surface."
-    mean = row["wave"]["mean"]
-    return "" if mean is None else f"Its waves are {mean:.2f} mm high."
+    mean = _height(row)
+    if mean is None:
+        return ""
+    return f"Its waves are {mean:.2f} mm high{', measured along the surface' * _along(row)}."
+
+
+def _along(row: Row) -> bool:
+    return (row["surface"] or {}).get("wave_height") is not None
+
+
+def _height(row: Row) -> float | None:
+    """Return the mean height of a stroke's waves, mm, along the surface where there is one."""
+    along: float | None = (row["surface"] or {}).get("wave_height")
+    flat: float | None = row["wave"]["mean"]
+    return flat if along is None else along
 
 
 def _off(row: Row, reference: str | None) -> str:
@@ -85,13 +173,20 @@ def _off(row: Row, reference: str | None) -> str:
 
 
 def _ends(row: Row) -> str:
-    along = row["surface"] or {}
-    start, goal = (along.get(f"{end}_error", row[f"{end}_error"]) for end in ("start", "goal"))
-    if start is None or goal is None:
+    errors = _errors(row)
+    if errors is None:
         return ""
+    start, goal = errors
     if max(start, goal) < SMALL:
         return f"It begins and ends {distance(0.0)} off where it should."
     return f"It begins {distance(start)} and ends {distance(goal)} off where it should."
+
+
+def _errors(row: Row) -> tuple[float, float] | None:
+    """Return how far a stroke begins and ends off where it should, mm, where that is known."""
+    along = row["surface"] or {}
+    start, goal = (along.get(f"{end}_error", row[f"{end}_error"]) for end in ("start", "goal"))
+    return None if start is None or goal is None else (start, goal)
 
 
 def _lies(row: Row) -> str:
