@@ -3,8 +3,10 @@
 Stamps that count from an epoch are counted from the first of them, before they become doubles.
 """
 
+import re
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from dmpcli.arrays import Floats
@@ -14,6 +16,9 @@ from dmpcli.records.tables import Table, is_text
 
 EPOCH = 1e6
 """A first stamp beyond this, s, counts from an epoch, not from when something was switched on."""
+
+_DAY = 86400.0
+_TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d([.,]\d+)?")
 
 # Twelve digits after the point: 1 ns in units of ns, s or anything between; 25 before it.
 _EXACT = pa.decimal128(37, 12)
@@ -26,7 +31,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
     ----------
     table : Table
     column : str
-        Numbers, dates, or text of either.
+        Numbers, dates, times of day, or text of any.
     unit : str
         Of numbers.
     nanoseconds : str, optional
@@ -79,22 +84,41 @@ def clock(table: Table, column: str, unit: str, first: float) -> float | None:
 
 
 def _dates(values: Any) -> Floats | None:
-    """Seconds since the first of dates; None where the column holds something else."""
+    """Seconds since the first of dates or times of day; None where the column holds others."""
+    by_day = False
     try:
         if is_text(values.type):
-            if len(values) == 0 or b":" not in str(values[0].as_py()).encode():
+            first = str(values[0].as_py()).strip() if len(values) else ""
+            if ":" not in first:
                 return None
-            zone = str(values[0].as_py()).rstrip().endswith("Z")
-            values = values.cast(pa.timestamp("ns", "UTC" if zone else None))
+            by_day = _TIME_OF_DAY.fullmatch(first) is not None
+            if by_day:
+                values = _on_one_day(values)
+            zone = "UTC" if first.endswith("Z") else None
+            values = values.cast(pa.timestamp("ns", zone))
+        elif pa.types.is_time(values.type):
+            by_day, values = True, values.cast(pa.time64("ns"))
         elif not pa.types.is_timestamp(values.type):
             return None
-        ns = columns.numbers(values.cast(pa.timestamp("ns", values.type.tz)).cast(pa.int64()))
+        else:
+            values = values.cast(pa.timestamp("ns", values.type.tz))
+        ns = columns.numbers(values.cast(pa.int64()))
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
         return None
     if values.null_count:
         return None
     t: Floats = (ns - ns[0]) * 1e-9
+    if by_day:
+        # The only step back by half a day or more that a clock makes is the one at midnight.
+        t[1:] += _DAY * np.cumsum(np.diff(t) < -0.5 * _DAY)
     return t
+
+
+def _on_one_day(values: Any) -> Any:
+    import pyarrow.compute as pc
+
+    values = pc.replace_substring(pc.utf8_trim_whitespace(values), ",", ".")
+    return pc.binary_join_element_wise("2000-01-01 ", values, "")
 
 
 def _exact(values: Any, decimal: str, factor: float) -> Floats | None:
