@@ -67,7 +67,7 @@ def lift(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Samples:
     status, sharp, slivers = np.empty(B, dtype=np.int64), *np.empty((2, B), dtype=bool)
     width = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
     cross_step = width / np.ceil(width / STEP - 1e-6)
-    shapes = _grids(u / centre.step, v / cross_step)
+    shapes = grids(u / centre.step, v / cross_step)
     kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
     for number, shape in enumerate(kinds):
         members = np.flatnonzero(kind.reshape(-1) == number)
@@ -82,7 +82,7 @@ def lift(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Samples:
     return Samples(foot, e_v, normal, face, stretch, outside, status, sharp, slivers)
 
 
-def _grids(u: Floats, v: Floats) -> Integers:
+def grids(u: Floats, v: Floats) -> Integers:
     """`Grid` of each pair, shape (B, 4), of coordinates (B, T) counted in steps."""
 
     def nodes(reach: Floats) -> Integers:

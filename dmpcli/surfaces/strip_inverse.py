@@ -179,7 +179,7 @@ def _strips(
     u, v = at[..., 0], at[..., 1]
     width = np.maximum(np.abs(v).max(axis=1), strip_chart.LEAST_WIDTH)[:, None]
     cross_step = width / np.ceil(width / strip_chart.STEP - 1e-6)
-    shapes = strip_chart._grids(u / charts.centre.step, v / cross_step)
+    shapes = strip_chart.grids(u / charts.centre.step, v / cross_step)
     kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
     for number, shape in enumerate(kinds):
         members = np.flatnonzero(kind.reshape(-1) == number)
