@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from dmpcli.arrays import Floats
+from dmpcli.errors import InputError
 from dmpcli.records import columns
 from dmpcli.records.layouts import TIME
 from dmpcli.records.tables import Table, is_text
@@ -19,6 +20,7 @@ EPOCH = 1e6
 
 _DAY = 86400.0
 _TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d([.,]\d+)?")
+_VALID = re.compile(r"([01]\d|2[0-3]):[0-5]\d:[0-5]\d([.,]\d{1,9})?")
 
 # Twelve digits after the point: 1 ns in units of ns, s or anything between; 25 before it.
 _EXACT = pa.decimal128(37, 12)
@@ -56,6 +58,7 @@ def seconds(table: Table, column: str, unit: str, nanoseconds: str | None = None
         dates = _dates(values)
         if dates is not None:
             return dates
+        _refuse_times_of_day(table, column, values)
         exact = _exact(values, table.decimal, TIME[unit])
         if exact is not None:
             return exact
@@ -112,6 +115,19 @@ def _dates(values: Any) -> Floats | None:
         # The only step back by half a day or more that a clock makes is the one at midnight.
         t[1:] += _DAY * np.cumsum(np.diff(t) < -0.5 * _DAY)
     return t
+
+
+def _refuse_times_of_day(table: Table, column: str, values: Any) -> None:
+    """Name the row that is none in a column that begins with a time of day."""
+    if not is_text(values.type) or len(values) == 0:
+        return
+    words = [str(word).strip() for word in values.to_pylist()]
+    if _TIME_OF_DAY.fullmatch(words[0]):
+        row = next((n for n, word in enumerate(words) if not _VALID.fullmatch(word)), 0)
+        raise InputError(
+            f"{table.name}: column {column!r}, {table.at(row)}: {table.shown(column, row)} is not "
+            "a time of day HH:MM:SS; mend or remove the row"
+        )
 
 
 def _on_one_day(values: Any) -> Any:

@@ -3,7 +3,9 @@ import datetime as dt
 import numpy as np
 import pyarrow as pa
 import pytest
+from typer.testing import CliRunner
 
+from dmpcli import cli
 from dmpcli.records import stamps
 
 
@@ -27,3 +29,14 @@ def test_a_step_back_within_the_day_stays_one():
 @pytest.mark.parametrize("words", [["10:00:00", "25:00:00"], ["10:00:00", "soon"], ["10:00"]])
 def test_what_is_no_time_of_day_is_left_to_others(words):
     assert stamps._dates(pa.array(words)) is None
+
+
+def test_the_row_that_is_no_time_of_day_is_named(tmp_path):
+    words = ["10:00:00.0", "10:00:00.5", "10:61:00.0"]
+    rows = "".join(f"{word},{n},0,0\n" for n, word in enumerate(words))
+    (tmp_path / "b.csv").write_text("Time,x,y,z\n" + rows)
+    done = CliRunner().invoke(
+        cli.app, ["fit", str(tmp_path / "b.csv"), "--map", "t=Time", "-o", str(tmp_path / "s.json")]
+    )
+    assert done.exit_code == 2
+    assert "line 4: '10:61:00.0' is not a time of day HH:MM:SS" in done.stderr
