@@ -2,7 +2,8 @@
 
 Dask only carries parts to workers and outcomes back; the files are ours, so they are the same as
 from one machine, whatever the number of workers and whichever dies on the way. Every worker needs
-the same programs and must see the batch's folder under the same path.
+the same programs and must see the batch's folder under the same path, which may be an object
+store's: each then reads and writes it with credentials of its own environment.
 """
 
 import contextlib
@@ -12,7 +13,6 @@ import platform
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
@@ -24,11 +24,15 @@ from dmpcli import extras
 from dmpcli.batch.part import Job, Outcome, Part, draw_part
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import DmpError, InputError, InstrumentError
+from dmpcli.records import file_io
+from dmpcli.records.object_store import ObjectPath
+from dmpcli.records.storage import Location, located
 from dmpcli.version import __version__
 
 PATIENCE = 5.0
 """How long a scheduler may take to answer, s."""
 
+_MARK = b"dmpcli"
 _AHEAD = 2
 _PLUGIN = "dmpcli-"
 
@@ -110,8 +114,9 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
             self.limits.restore_original_limits()
             worker.__dict__.pop(self.name, None)
 
-    _check(client, address, Path(job.folder).absolute(), job.task.style.compiled)
-    job = replace(job, folder=str(Path(job.folder).absolute()))
+    folder = located(job.folder).absolute()
+    _check(client, address, folder, job.task.style.compiled)
+    job = replace(job, folder=str(folder))
     name = _PLUGIN + uuid4().hex
     client.register_plugin(Bringer(name))
     try:
@@ -127,7 +132,7 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
         client.unregister_worker_plugin(name)
 
 
-def _check(client: Any, address: str, folder: Path, kernels: bool) -> None:
+def _check(client: Any, address: str, folder: Location, kernels: bool) -> None:
     """Refuse a cluster whose workers would draw other bytes, or elsewhere."""
     if not client.ncores():
         raise InstrumentError(f"--cluster {address}: the scheduler has no workers; start some")
@@ -147,20 +152,26 @@ def _check(client: Any, address: str, folder: Path, kernels: bool) -> None:
                 )
     mark = folder / f".{uuid4().hex}.tmp"
     try:
-        mark.touch()
+        file_io.write(mark, _MARK)
         seen: dict[str, bool] = client.run(_sees, str(mark))
     finally:
         mark.unlink(missing_ok=True)
+    remedy = "choose a folder on a file system that all share"
+    if isinstance(folder, ObjectPath):
+        remedy = "it needs credentials, and AWS_ENDPOINT_URL and AWS_REGION, in its own environment"
     for worker, sees in seen.items():
         if not sees:
             raise InputError(
-                f"--cluster {address}: worker {worker} does not see {folder}; "
-                "choose a folder on a file system that all share"
+                f"--cluster {address}: worker {worker} does not see {folder}; {remedy}"
             )
 
 
 def _sees(mark: str) -> bool:
-    return Path(mark).is_file()
+    """Tell whether a file is there, as this process sees it; runs on a worker."""
+    try:
+        return located(mark).is_file()
+    except DmpError:
+        return False
 
 
 def _draw(name: str, part: Part) -> Outcome:
