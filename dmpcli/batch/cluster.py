@@ -10,7 +10,8 @@ import contextlib
 import importlib.metadata
 import importlib.util
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
@@ -108,7 +109,7 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
 
             # With more threads the last bits of a product depend on the number of cores.
             self.limits = threadpool_limits(1)
-            setattr(worker, self.name, job)
+            setattr(worker, self.name, _brought(job, ours, worker.name))
 
         def teardown(self, worker: Any) -> None:
             self.limits.restore_original_limits()
@@ -117,9 +118,10 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
     folder = located(job.folder).absolute()
     _check(client, address, folder, job.task.style.compiled)
     job = replace(job, folder=str(folder))
+    ours = versions(job.task.style.compiled)
     name = _PLUGIN + uuid4().hex
-    client.register_plugin(Bringer(name))
     try:
+        client.register_plugin(Bringer(name))
         waiting = as_completed(loop=client.loop, raise_errors=False)
         ahead = _AHEAD * sum(client.ncores().values())
         for part in parts:
@@ -128,8 +130,11 @@ def _drawn(client: Any, address: str, job: Job, parts: Iterable[Part]) -> Iterat
                 yield _result(next(waiting), address)
         for future in waiting:
             yield _result(future, address)
+    except (OSError, CancelledError) as error:
+        raise _lost(address, error) from None
     finally:
-        client.unregister_worker_plugin(name)
+        with contextlib.suppress(OSError, CancelledError):  # nobody there has it any more
+            client.unregister_worker_plugin(name)
 
 
 def _check(client: Any, address: str, folder: Location, kernels: bool) -> None:
@@ -144,12 +149,9 @@ def _check(client: Any, address: str, folder: Location, kernels: bool) -> None:
             "install it there"
         ) from None
     for worker, theirs in found.items():
-        for package, ours in versions(kernels).items():
-            if theirs.get(package) != ours:
-                raise InputError(
-                    f"--cluster {address}: worker {worker} has {package} {theirs.get(package)}, "
-                    f"here it is {ours}; install the same"
-                )
+        other = _differs(theirs, versions(kernels))
+        if other is not None:
+            raise InputError(f"--cluster {address}: worker {worker} {other}")
     mark = folder / f".{uuid4().hex}.tmp"
     try:
         file_io.write(mark, _MARK)
@@ -166,6 +168,23 @@ def _check(client: Any, address: str, folder: Location, kernels: bool) -> None:
             )
 
 
+def _differs(theirs: Mapping[str, str], ours: Mapping[str, str]) -> str | None:
+    """Say which version of a worker is another than ours, and what to do; None if none is."""
+    for package, version in ours.items():
+        if theirs.get(package) != version:
+            return f"has {package} {theirs.get(package)}, here it is {version}; install the same"
+    return None
+
+
+def _brought(job: Job, ours: Mapping[str, str], worker: object) -> Job | str:
+    """Return the job for a worker, or why it cannot have it; runs on the worker.
+
+    One that comes later was not there when all were asked.
+    """
+    other = _differs(versions(job.task.style.compiled), ours)
+    return job if other is None else f"worker {worker} {other}"
+
+
 def _sees(mark: str) -> bool:
     """Tell whether a file is there, as this process sees it; runs on a worker."""
     try:
@@ -178,7 +197,10 @@ def _draw(name: str, part: Part) -> Outcome:
     """Draw one part; runs on a worker."""
     from distributed import get_worker
 
-    return draw_part(getattr(get_worker(), name), part)
+    job: Job | str = getattr(get_worker(), name)
+    if isinstance(job, str):
+        raise InputError(f"--cluster: {job}")
+    return draw_part(job, part)
 
 
 def _result(future: Any, address: str) -> Outcome:
@@ -193,6 +215,18 @@ def _result(future: Any, address: str) -> Outcome:
             f"--cluster {address}: workers died again and again over one part ({error}); the same "
             "command goes on from here: give them more memory, or take fewer --pairs-per-part"
         ) from None
-    except OSError as error:
-        raise InstrumentError(f"--cluster {address}: was lost: {error}") from None
+    except ImportError as error:
+        raise InputError(
+            f"--cluster {address}: a worker cannot run dmpcli {__version__} ({error}); install it "
+            "there"
+        ) from None
+    except (OSError, CancelledError) as error:
+        raise _lost(address, error) from None
     return outcome
+
+
+def _lost(address: str, error: BaseException) -> InstrumentError:
+    return InstrumentError(
+        f"--cluster {address}: was lost ({type(error).__name__}); the same command goes on from "
+        "here"
+    )

@@ -150,8 +150,14 @@ def say(content: bytes) -> None:
         raise InputError(f"standard output: cannot be written: {error.strerror}") from None
 
 
-def check_writable(path: str | Location) -> None:
+def check_writable(path: str | Location, here: bool = False) -> None:
     """Refuse an output that could not be written, before any work is done.
+
+    Parameters
+    ----------
+    path : str, Path or ObjectPath
+    here : bool
+        Whether it must be of this machine: what an instrument said is not trusted to a network.
 
     Raises
     ------
@@ -165,6 +171,8 @@ def check_writable(path: str | Location) -> None:
             raise InputError("-o -: would write a file to the terminal; redirect or name a file")
         return
     file = located(path)
+    if here and isinstance(file, ObjectPath):
+        raise _not_here(file)
     if file.is_dir():
         raise InputError(f"{path}: is a directory, the output needs a file name")
     if isinstance(file, ObjectPath):
@@ -235,12 +243,7 @@ def write_new(path: str | Path, content: bytes) -> Path:
     if str(path) == DASH:
         say(content)
         return Path(DASH)
-    if isinstance(located(path), ObjectPath):
-        raise InputError(
-            f"{path}: what cannot be made again is written on this machine: a store may replace "
-            "what has its name; name a file here, and copy it"
-        )
-    check_writable(path)
+    check_writable(path, here=True)
     file = _meant(path)
     if file.exists() and not file.is_file():
         _write_special(file, content)
@@ -255,6 +258,13 @@ def write_new(path: str | Path, content: bytes) -> Path:
             else:
                 return file
     raise AssertionError  # pragma: no cover
+
+
+def _not_here(path: ObjectPath) -> InputError:
+    return InputError(
+        f"{path}: what cannot be made again is written on this machine, and a store could replace "
+        "what has its name; name a file here, and copy it"
+    )
 
 
 def _meant(path: str | Path) -> Path:

@@ -60,8 +60,8 @@ def located(name: str | Location) -> Location:
     if found is None:
         if _FLAT.match(text):
             raise InputError(
-                f"{text}: names a store, which fit, generalize, report and inspect take (with two "
-                "slashes); elsewhere copy the file to this machine first"
+                f"{text}: names a store, which fit, generalize, execute, report and inspect read "
+                "(with two slashes); elsewhere copy the file to this machine first"
             )
         return name if isinstance(name, Path) else Path(text)
     scheme, rest = found[1].lower(), found[2]
