@@ -81,7 +81,7 @@ class BadFrameError(Exception):
 
 
 @dataclass(frozen=True)
-class Report:
+class MonitorReport:
     """What one frame says.
 
     Attributes
@@ -113,7 +113,7 @@ class Report:
         return self.estop or self.collision or self.state in ALARMING
 
 
-def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:
+def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> MonitorReport:
     """Read one frame.
 
     Parameters
@@ -147,7 +147,7 @@ def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:
     for flag, value in zip(_FLAGS, flags, strict=True):
         if value not in (0, 1):
             raise BadFrameError(f"holds what is neither yes nor no: {flag} {value}")
-    return Report(t, timestamp, np.array(joints), state, mode, *map(bool, flags))
+    return MonitorReport(t, timestamp, np.array(joints), state, mode, *map(bool, flags))
 
 
 class FrameBuffer:
@@ -175,7 +175,7 @@ class FrameBuffer:
         self.lost = False
         self.fault = ""
 
-    def feed(self, received: bytes, t: float) -> list[Report]:
+    def feed(self, received: bytes, t: float) -> list[MonitorReport]:
         """Take in bytes; return what their whole frames say, oldest first.
 
         Parameters
