@@ -4,11 +4,9 @@ A job and a part travel to other processes and machines, so both hold plain valu
 however often a part is drawn, its file has the same bytes.
 """
 
-import contextlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +20,10 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.tool_speed import LEAST_HELD, held
 from dmpcli.errors import DmpError, InputError, RefusedError
 from dmpcli.records import file_io, record, trajectory
+from dmpcli.records.draft import Draft
 from dmpcli.records.record import Form, Provenance, Record
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import located
 from dmpcli.spatial import output_events
 from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.surfaces.surface import LEAVES, Status, Surface
@@ -42,7 +42,7 @@ class Job:
         Of every part.
     form : Form
     folder : str
-        Where the parts go; every process that draws must see it.
+        Where the parts go, or the URL of an object store; every process that draws must see it.
     prepare : callable, optional
         Makes pairs ready whose table names their surfaces; `task` then has none.
     nested : bool
@@ -455,24 +455,21 @@ def _ends(piece: DrawnStroke) -> PieceEnds:
 def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:
     facts = drawn.provenance.facts | {FACT: outcome.fact()}
     drawn = replace(drawn, provenance=replace(drawn.provenance, facts=facts))
-    file = Path(job.folder) / job.file_of(part.number)
-    temporary: Path | None = None
+    file = located(job.folder) / job.file_of(part.number)
+    draft: Draft | None = None
     try:
         # Another machine may draw the same part: a name that nobody else has. Not flushed to the
         # disk one by one: after a power cut a part can be drawn again, and the manifest tells its
         # size.
         if job.nested:
             file.parent.mkdir(exist_ok=True)
-        temporary, stream = file_io.temporary_of(file)
-        with stream:
-            record.store(drawn, stream, job.form)
-        size = temporary.stat().st_size
-        temporary.replace(file)
+        draft = Draft(file)
+        record.store(drawn, draft.stream, job.form)
+        size = draft.keep()
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise InputError(f"{file}: cannot be written: {reason}") from None
     finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
+        if draft is not None:
+            draft.drop()
     return replace(outcome, rows=len(drawn.columns["t"]), size=size)

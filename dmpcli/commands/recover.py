@@ -32,7 +32,7 @@ def command(
     from dmpcli.workflows.run_output import write_once
 
     suffixes.check(output, suffixes.PARQUET)
-    file_io.check_writable(output)
+    file_io.check_writable(output, here=True)
     if output != file_io.DASH and Path(output).is_file() and not force:
         raise InputError(f"{output}: exists; choose another name, or give --force")
     found = journals.read(file_io.read(journal, journal=True))

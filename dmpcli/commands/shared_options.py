@@ -62,7 +62,7 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     def run(**said: Any) -> None:
         log, asked = said.pop("log"), said.pop("print_config", False)
         as_json = said["as_json"] if own_json else said.pop("as_json")
-        line = shlex.join(["dmpcli", name, *words])
+        line = shlex.join(["dmpcli", name, *map(_printed, words)])
         with logged(log, f"{line} (dmpcli {__version__})"):
             if asked and describe is not None:
                 _print(describe(name, said, as_json))
@@ -75,6 +75,15 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     run.__doc__, run.__module__, run.__name__ = command.__doc__, command.__module__, "command"
     run.__dict__.update(__signature__=inspect.Signature(parameters), __wrapped__=command)
     return run
+
+
+def _printed(word: str) -> str:
+    """Return a word of the command line as a log may keep it: without credentials."""
+    if "://" not in word:
+        return word
+    from dmpcli.records.storage import hidden
+
+    return hidden(word)
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
@@ -128,7 +137,9 @@ def _as_json(name: str, output: str) -> Iterator[None]:
 
 def _described(output: str) -> Any:
     """Return what ``inspect --json`` says of the output, if it is one file or folder."""
-    if not output or not Path(output).exists():
+    from dmpcli.records.storage import located
+
+    if not output or not (place := located(output)).exists():
         return None
     from dmpcli.reporting import inspection
     from dmpcli.workflows.inspect import inspect as inspected
@@ -136,7 +147,7 @@ def _described(output: str) -> Any:
     try:
         return json.loads(inspection.as_json(inspected(output)))
     except DmpError:  # a file of another program
-        return {"file": output, "bytes": Path(output).stat().st_size}
+        return {"file": output, "bytes": place.stat().st_size}
 
 
 def _print(text: str) -> None:

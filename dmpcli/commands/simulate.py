@@ -69,7 +69,7 @@ def command(
         )
     faults = fault_words.parse(served.fault)
     if drawn is not None:
-        file_io.check_writable(drawn)
+        file_io.check_writable(drawn, here=True)
     setting, hand = _scene(settings, faults, tool, served.strokes, served.lookahead)
     if surface is not None:
         setting = _on(surface, surface_pose, surface_unit, setting)
