@@ -238,3 +238,22 @@ def test_as_many_set_points_as_may_be_are_planned_and_no_more(monkeypatch):
     assert len(plan(stroke())) == 501
     with pytest.raises(InputError, match="over 500 set-points"):
         plan(stroke(duration=10.02))
+
+
+def test_an_attitude_that_passes_half_a_turn_is_resampled_without_a_jump():
+    """A pen that points down, rx = π, is half a turn: leaning to and fro it passes that."""
+    t = np.arange(21) * 0.1
+    lean = 0.4 * minimum_jerk(t / 2.0) - 0.2
+    angles = np.column_stack([np.pi + lean, 0.0 * t, 0.3 * lean])
+    source = replace(stroke(duration=2.0, rate=10.0), rotation=rotations.from_euler(angles))
+    made = plan(source)
+    at = np.interp(made.t, np.linspace(0.0, 2.0, 2001), 0.4 * minimum_jerk(np.linspace(0, 1, 2001)))
+    angles = np.column_stack([np.pi + at - 0.2, 0.0 * at, 0.3 * (at - 0.2)])
+    off = rotations.log(rotations.from_euler(angles) @ np.swapaxes(made.rotation, -1, -2))
+    assert np.abs(off).max() < 2e-3
+    velocity = made.derivatives()[0][:, 1]
+    assert np.linalg.norm(velocity, axis=1).max() < 1.1 * 1.875 * 0.42 / 2.0
+    # Between two set-points too.
+    for index in (47.5, 50.25, 53.75):
+        turn = rotations.log(made.at(index)[1] @ made.rotation[int(index)].T)
+        assert np.linalg.norm(turn) < 0.02
