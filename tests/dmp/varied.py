@@ -15,27 +15,36 @@ from dmpcli.dmp import (
     arc_length,
     common_timing,
     contact_heights,
+    copies,
     demonstrations,
+    feasibility,
+    forced_model,
     learning,
     least_squares,
     noise,
     path_registration,
     pauses,
     pieces,
+    regression,
+    rollout,
     segmentation,
+    sides,
     spline_ends,
     spline_smoothing,
     stroke_plane,
     taught_strokes,
     time_base,
+    time_scaling,
     tool_speed,
+    transformation_system,
 )
 from dmpcli.dmp.alignment import align
 from dmpcli.dmp.basis_search import Quality
+from dmpcli.dmp.canonical_system import even_in_time
 from dmpcli.dmp.curve import Curve
 from dmpcli.dmp.demonstrations import ComparedPath
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
-from dmpcli.dmp.generalization import draw
+from dmpcli.dmp.generalization import charts_of, draw
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.path_registration import Correspondence
 from dmpcli.dmp.preprocessing import preprocess
@@ -833,4 +842,89 @@ def strokes_of_few_functions_drawn():
             ):
                 more = GeneralizeOptions(**({"rate": 8.0} | style))
                 found += draw(skill, pairs, seconds, surface, more)
+    return found
+
+
+@case
+def few_functions_to_turned_pairs():
+    """Tools asked for at both ends, at the start alone or not at all; copies; both models."""
+    one = swung(3.0, lambda s: 0 * s, False)
+    start = np.array([[0.0, 0, 0], [20.0, 5, 0], [0, 9, 0]])
+    goal = start + [[70.0, 10, 0], [-50.0, 60, 0], [3.0, 90, 0]]
+    R = rotations.exp(np.array([[0.1, 0.2, 0.9], [0.0, 0.3, -1.0], [0.2, 0, 2.0]])) @ DOWN
+    asked = (
+        Pairs(start, goal),
+        Pairs(start, goal, R),
+        Pairs(start, goal, R, R[::-1].copy()),
+        copies.copied(Pairs(start[:1], goal[:1], R[:1]), 3, 7.0),
+    )
+    found: list = []
+    for options in (
+        {},
+        {"tau": 2.0, "damping": 9.0, "regression": "ridge"},
+        {"model": "original"},
+        {"model": "original", "forcing_scale": "distance"},
+        {"learning": "paper", "alpha_1": 1.6},
+    ):
+        skill = learning.fit([one], FitOptions(basis=16, **options)).skill
+        shared = rollout.curves(skill, np.linspace(0.0, skill.duration, 9))
+        found.append(shared)
+        for pairs in asked:
+            charts = None if skill.model == "original" else charts_of(skill, pairs, PLATE)
+            for more in ({}, {"amplitude": "scale"}, {"orientation": "surface"}):
+                found.append(rollout.poses(skill, shared, pairs, charts, **more))
+                drawn = rollout.roll_out(skill, shared, pairs, charts, **more)
+                found += [drawn.position, drawn.euler]
+            seconds = np.full(len(pairs), skill.duration)
+            style = GeneralizeOptions(ease_in=0.2, ease_out=0.4)
+            admitted = feasibility.admit(skill, pairs, seconds, style, PLATE, 0.5)
+            found += [admitted, admitted.admitted, admitted.distance]
+            found += [feasibility.tool_axis(skill, pairs), sides.turned_over(skill, pairs, BALL)]
+    return found
+
+
+@case
+def laws_of_chance_there_and_back():
+    rng = np.random.default_rng(26)
+    found: list = []
+    for count in (2, 3, 9, 60):
+        t = np.r_[0.0, np.cumsum(rng.uniform(0.01, 0.5, count - 1))]
+        s = np.r_[0.0, np.cumsum(rng.choice([0.0, 1.0, 9.0], count - 1) + 1e-3)]
+        one = arc_length.monotone(t, s, rng.choice([0.0, 5.0, 80.0], count))
+        found += [one, one.length, one.duration, one.place(t[-1] * np.linspace(0, 1, 13))]
+        found += [one.time(s[-1] * np.linspace(-0.1, 1.1, 13))]
+    x = np.cumsum(rng.normal(size=(12, 2)), axis=0)
+    path = demonstrations.through(np.linspace(0.0, 2.0, 12), x)
+    found += [arc_length.of_path(path, np.linspace(0.0, 2.0, n)) for n in (5, 30)]
+    for seconds, rate, ease in (
+        (3.0, 10.0, (0.0, 0.0)),
+        (3.02, 10.0, (0.5, 1.0)),
+        (1.0, 9.0, (1, 1)),
+    ):
+        found.append(time_scaling.timing(seconds, rate, 2.0, 0.7, *ease))
+    return [*found, time_scaling.eased(np.linspace(-0.5, 3.0, 15), 1.0)]
+
+
+@case
+def springs_of_chance():
+    rng = np.random.default_rng(27)
+    found: list = []
+    for count in (1, 2, 5, 24):
+        for rule in ("spacing", "power"):
+            basis = even_in_time(count, 3.0, 1.1, 1.3, rule)
+            s = np.exp(-1.3 / 1.1 * np.linspace(0.0, 3.0, 17))
+            w = rng.normal(size=(2, count))
+            found += [basis, basis.reach, basis.banded, basis.mean(s, w), basis.normalized(s)]
+            found += [basis.exponents(s[:3]), basis.window(s)]
+            forcing = np.column_stack([np.sin(5 * s), s])
+            found += [regression.lwr(basis, s, s, forcing), regression.ridge(basis, s, s, forcing)]
+        k, d = rng.uniform(20.0, 90.0, 2), rng.uniform(4.0, 30.0, 2)
+        spring = transformation_system.TransformationGains(k, d, rng.uniform(0.3, 2.0))
+        t = np.r_[0.0, np.cumsum(rng.uniform(0.0, 0.4, 7))]
+        found += [transformation_system.transition(spring, t)]
+        found += [transformation_system.homogeneous(spring, t)]
+        found += [transformation_system.longest_step(spring, 3.0, count)]
+        model = forced_model.forced_model(count, k[0], d[0], 0.6, 1.2, "spacing")
+        found += [model.samples, model.a, model.b, model.c, model.end, model.end_responses]
+        found += [model.end_moves, model.start_move, model.response(w)]
     return found

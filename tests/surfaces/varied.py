@@ -15,6 +15,8 @@ from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces import (
+    chordal_error,
+    extent,
     frame_smoothing,
     geodesic_search,
     geodesic_shooting,
@@ -26,9 +28,12 @@ from dmpcli.surfaces import (
     mesh_regions,
     mesh_repair,
     open_patches,
+    placement,
+    polygons,
     pose_bound,
     pose_search,
     registration,
+    sharp_edges,
     strip_grid,
     strip_inverse,
     tangential,
@@ -36,8 +41,10 @@ from dmpcli.surfaces import (
 from dmpcli.surfaces.border_margin import BorderMargin
 from dmpcli.surfaces.conditioning import conditioning_of
 from dmpcli.surfaces.cylinder import Cylinder
+from dmpcli.surfaces.keep_out import enclosed
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.mesh_noise import noise
+from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.slit_crossings import crossed
 from dmpcli.surfaces.sphere import Sphere
 from dmpcli.surfaces.strip_grid import Grid
@@ -869,3 +876,99 @@ def strokes_lifted_alone_and_among_others():
             found += right(some.lift(coordinates[rows]))
             found += [some.lengths, some.target, some.centre.origin]
     return [*found, replace(charts, creased=~charts.creased).lift(coordinates).status]
+
+
+@case
+def what_small_meshes_say_of_themselves():
+    found: list = []
+    for name, mesh in meshes().items():
+        points = scattered(mesh, 25, 40, 4.0).reshape(5, 5, 3)
+        at = mesh.closest(points)
+        flat, face = at.position.reshape(-1, 3), at.face.reshape(-1)
+        found += [name, mesh.dihedrals, mesh.developable, mesh.outward, mesh.edge_length]
+        found += [mesh.chordal_error, mesh.reach, mesh.planes, mesh.parts, at]
+        found += [mesh.beyond_border(points.reshape(-1, 3), flat, face)]
+        found += [mesh._tips(mesh.corner_normals), mesh._ends(mesh.dihedrals > 10.0)]
+        found += [
+            mesh.slits.off(flat),
+            placement.box(mesh),
+            sharp_edges.sharp_edges(mesh.V, mesh.F),
+        ]
+        found += [chordal_error.chordal_error(mesh.V, mesh.F), extent.area(mesh.V, mesh.F)]
+        found += [extent.volume(mesh.V, mesh.F), mesh.topology.border_vertices]
+        other = type(mesh).with_parts(mesh.V, mesh.F, mesh.parts)
+        found += [other.noise, other.components, other.corner_normals]
+    return found
+
+
+@case
+def pieces_within_pieces():
+    ball = made(trimesh.creation.icosphere(1, 20.0))
+    small, out = (0.4 * ball[0], ball[1][:, ::-1]), (ball[0] + [60.0, 0, 0], ball[1])
+    found: list = []
+    for some in ([ball], [ball, small], [ball, (small[0], ball[1])], [ball, small, out]):
+        V, F = joined(*some)
+        found += [extent.volume(V, F), extent.volume(V, F[:, ::-1]), extent.volume(V, F[1:])]
+    return found
+
+
+@case
+def exact_surfaces_walked_and_charted():
+    rng = np.random.default_rng(41)
+    plane = Plane(np.array([1.0, 2.0, 3.0]), np.array([0.48, 0.6, 0.64]))
+    found: list = []
+    for surface in (plane, DRUM, BALL):
+        points = 70.0 * rng.normal(size=(2, 3, 3))
+        at = surface.closest(points)
+        heading = rng.normal(size=(2, 3, 3))
+        found += [at, surface.walk(at.position, heading, rng.uniform(-40, 90, (2, 3)))]
+        a, b = at.position.reshape(-1, 3)[:4], at.position.reshape(-1, 3)[2:]
+        found.append(surface.connect(a, b))
+        for side in (None, rng.normal(size=3), rng.normal(size=(4, 3))):
+            charts = surface.charts(a, b, side)
+            u = 25.0 * rng.normal(size=(4, 5, 3))
+            found += [charts.lengths, charts.goals, charts.status, charts.lift(u)]
+            found += [charts.rows(np.array([3, 1])).lift(u[[3, 1]]).position, charts.over(u)]
+            turned = rotations.exp(rng.normal(size=3))
+            closed = surface.charts(a, a + 2.0 * rng.normal(size=(4, 3)), side, turned)
+            found += [closed.goals, closed.lengths, closed.lift(0.5 * u)]
+    return found
+
+
+@case
+def regions_on_exact_surfaces():
+    rng = np.random.default_rng(42)
+    plane = Plane(np.array([0.0, 0.0, 5.0]), np.array([0.0, 0.0, 1.0]))
+    found: list = []
+    for surface in (plane, DRUM, BALL):
+        for size in (8.0, 25.0):
+            a = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))
+            r = size * rng.uniform(0.4, 1.0, 9)
+            line = surface.closest(np.column_stack([r * np.cos(a), r * np.sin(a), 60 + 0 * a]))
+            region = enclosed(surface, line.position)
+            path = np.cumsum(8.0 * rng.normal(size=(6, 7, 3)), axis=1) + [0.0, 0.0, 60.0]
+            found += [region.flat.axes, region.corners, region.flat(path)]
+            found += [region.holds(surface.closest(path).position)]
+    return found
+
+
+@case
+def polygons_of_chance():
+    rng = np.random.default_rng(43)
+    found: list = []
+    counts = rng.integers(3, 9, 25)
+    V = []
+    for count in counts:
+        a = np.sort(rng.uniform(0.0, 2.0 * np.pi, count))
+        a = a if rng.random() < 0.8 else rng.permutation(a)
+        r = rng.choice([1.0, 9.0], count) if rng.random() < 0.6 else np.full(count, 5.0)
+        flat_ = np.column_stack([r * np.cos(a), r * np.sin(a), 0 * a])
+        V.append(flat_ @ rotations.exp(rng.normal(size=3)).T + rng.normal(size=3))
+    V = np.concatenate(V)
+    one = polygons.cut(V, np.arange(len(V)), counts)
+    found += [one.F, one.crossed, polygons.cut(V, np.arange(len(V))[::-1], counts[::-1]).F]
+    flat_ = np.zeros((1, 5, 3))
+    flat_[0, :, 0] = [0, 1, 2, 3, 4]
+    found += [polygons._flattened(flat_, polygons._normals(flat_))]
+    found += [polygons._convex(V[:4][None], polygons._normals(V[:4][None]))]
+    return [*found, polygons.too_large(V, np.arange(len(V)), counts)]
