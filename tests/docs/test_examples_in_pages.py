@@ -39,7 +39,7 @@ PYTHON = {
 """Pages whose Python is run together with more than the page says, and where; that of all others
 is run here."""
 
-VARYING = re.compile(r"(?:netft|elite)://\S+|--id \S+|\d+")
+VARYING = re.compile(r"SIG[A-Z]+: |(?:netft|elite)://\S+|--id \S+|\d+")
 """What differs from run to run in what the program says."""
 
 
@@ -93,7 +93,9 @@ def _lay_out_forces(folder, wave):
     there = wave[:, 1:3] + [-950.0, 130.0]
     rows = np.column_stack([t, there, np.full(len(t), -17.54), 0 * there, force, 0 * there, 0 * t])
     text = "\n".join(",".join(f"{value:.6f}" for value in row) for row in rows)
-    (folder / "pressed.csv").write_text(f"t,x,y,z,fx,fy,fz,tx,ty,tz\n{text}\n")
+    (folder / "pressed.csv").write_text(
+        f"t,x,y,z,fx [N],fy [N],fz [N],tx [N·m],ty [N·m],tz [N·m]\n{text}\n"
+    )
 
 
 def _lay_out_parts(folder):
