@@ -32,9 +32,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         """Say that the tool has come down to a point e over the plan instead."""
         self.law = LawState(e)
 
-    def step(
-        self, t: float, force: float, across: float, wanted: float, speed: float = 0.0
-    ) -> float:
+    def step(self, t: float, force: float, across: float, wanted: float) -> float:
         """Take in one cycle's force; return e, mm.
 
         Parameters
@@ -45,8 +43,6 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
             Along the normal, and its size across it, N.
         wanted : float
             F_d at this set-point, N; 0 where the tool is lifted.
-        speed : float
-            Of the plan along the stroke, mm/s.
         """
         self.saturated = False
         if self.failure:
@@ -56,7 +52,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         self._least = min(contact, wanted / 2.0) if wanted > 0.0 else contact
         touches = self.state in ("drawing", "landing", "lost", "seeking")
         if touches and wanted > 0.0:
-            self._guard(t, force, across, wanted, speed)
+            self._guard(t, force, across, wanted)
         if self.urgent:
             return self.law.e
         if self.state == "free":

@@ -160,3 +160,15 @@ def test_only_young_samples_are_recent_but_all_are_checked():
     assert heard.recent(0.15) == []
     with pytest.raises(InstrumentError, match="not a number"):
         sensing([sample(0.0, np.nan), sample(5.0)]).recent(5.0)
+
+
+def test_looking_back_takes_what_is_whole_and_fails_for_nothing():
+    good = sample(0.0, 1.0)
+    bad = [sample(0.01, healthy=False), sample(0.02, np.nan)]
+    assert sensing([good, *bad]).rest() == [good]
+
+    class Broken:
+        def poll(self):
+            raise InstrumentError("the cable is out")
+
+    assert Sensing(Broken(), INFO, 100.0, 0.02, SimulatedClock()).rest() == []
