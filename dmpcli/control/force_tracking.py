@@ -198,7 +198,8 @@ class ForceTracker:
         speed = abs(float(step @ sides[hardest])) / (sizes[hardest] * plan.period)
         times = [t for t, _ in readings]
         series = list(zip(times, sizes, strict=True))
-        self.wall = met(supervisor.across, series, speed, supervisor.reaction + between)
+        reaction = supervisor.reaction + between
+        self.wall = met(supervisor.across, series, speed, reaction, plan.period)
         if self.wall is not None:
             supervisor.failure += f" ({self.wall})"
 

@@ -1,14 +1,17 @@
 """A wall or an edge that ended a stroke, and what no loop of its delay could have spared the tool.
 
 A loop runs into a wall until it has felt it and the arm stands: meanwhile the force rises by the
-wall's stiffness for each millimetre that the plan goes on. How fast it rises is seen best after the
-stroke was ended, reading by reading, while the arm comes to rest: in the cycle that ended it the
-tool had met the wall for a part of the time alone.
+wall's stiffness for each millimetre that the plan goes on. How fast it rises is seen between
+readings that both feel the wall, those too that come after the stroke was ended. The first of them
+is none of these: before it lies a blow, by the inertia and the damping of an arm that moves.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+# Of the largest force across the normal: what is less has not felt the wall.
+_LOADED = 0.25
 
 
 @dataclass(frozen=True)
@@ -50,9 +53,16 @@ class MetWall:
 
 
 def met(
-    across: float, felt: Sequence[tuple[float, float]], speed: float, reaction: float
+    across: float,
+    felt: Sequence[tuple[float, float]],
+    speed: float,
+    reaction: float,
+    period: float,
 ) -> MetWall | None:
     """Put together what was met; None where no rise of the force is seen, or nothing moved.
+
+    Where one reading alone has felt the wall, nothing tells the blow from the rise; then that force
+    is taken to have risen for a period.
 
     Parameters
     ----------
@@ -64,10 +74,24 @@ def met(
         Of the stroke against the wall, mm/s.
     reaction : float
         s.
+    period : float
+        Of the loop, s.
     """
-    rises = [(b - a) / (t - since) for (since, a), (t, b) in pairwise(felt) if t > since]
-    rise = max(rises, default=0.0)
-    if not (rise > 0.0 and speed > 0.0):
+    if not (felt and speed > 0.0):
         return None
-    largest = max(across, *(force for _, force in felt))
+    hardest = max(force for _, force in felt)
+    loaded = [force >= _LOADED * hardest for _, force in felt]
+    first = felt[loaded.index(True)][1]
+    rise = max(
+        (
+            (b - a) / (t - since)
+            for ((since, a), (t, b)), both in zip(pairwise(felt), pairwise(loaded), strict=True)
+            if all(both) and t > since
+        ),
+        default=0.0,
+    )
+    rise = rise if rise > _LOADED * first / period else first / period
+    if not rise > 0.0:
+        return None
+    largest = max(across, hardest)
     return MetWall(across, largest, speed, rise / speed, reaction)
