@@ -33,6 +33,7 @@ from dmpcli.control.execution import DRIFTED
 
 KEPT = ROOT / "out" / "force-runs.jsonl"
 _SAID = 72  # of why a run ended, characters
+POSITION_TOO = ("surfaces", "stiffness", "landing", "features")
 HEAD = (
     "contact, % | mean off, N | RMS, N | peak, N | landing, N | wave, mm | off, mm | k̂ off, % "
     "| seeds | ended"
@@ -97,8 +98,9 @@ def rows(table: str) -> list[Case]:
     found = []
     for case in TABLES[table]():
         found.append(case)
-        if table == "surfaces":
-            found.append(Case("… position only", case.plan, case.bench, coupled=False))
+        if table in POSITION_TOO:
+            brief = case.brief
+            found.append(Case("… position only", case.plan, case.bench, coupled=False, brief=brief))
     return found
 
 
