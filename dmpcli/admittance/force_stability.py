@@ -11,7 +11,7 @@ others swing, and a contact damps a little: a pen in its holder, a pad, a plate 
 
 import numpy as np
 
-from dmpcli.admittance.force_coupling import fast_filter
+from dmpcli.admittance.force_coupling import Filter, fast_filter
 from dmpcli.admittance.force_law import ForceGains
 from dmpcli.arrays import Floats
 
@@ -24,9 +24,8 @@ LOSS = 0.003
 MARGIN = 1.1
 """By how much gains must answer more slowly than those that begin to swing."""
 
-# Delays of the filter of eq. (10), by its step response, and of the mean of a period's readings
-# of what is taken up evenly; in periods.
-_FILTER, _READ = 0.5185, 0.25
+# Delay of the mean of a period's two readings of what is taken up evenly, in periods.
+_READ = 0.25
 # Steps within a period; of the bisection, and how far from the rule a bound is looked for, times.
 _WITHIN, _STEPS, _BRACKET = 20, 20, 100.0
 # Gains are softened by this, so many times.
@@ -55,7 +54,8 @@ def loop_matrix(gains: ForceGains, stiffness: float, delay: float, tool: float =
     """
     T = gains.period
     dt = T / _WITHIN
-    dead, lag = _parts(delay, T)
+    made = fast_filter(1.0, T)  # the same for any tau
+    dead, lag = _parts(delay, T, made)
     whole, late = divmod(round(dead / dt), _WITHIN)
     size = 10 + whole
     # Each quantity is a row: how it depends on the state at the cycle's begin.
@@ -66,7 +66,6 @@ def loop_matrix(gains: ForceGains, stiffness: float, delay: float, tool: float =
     push = force + integral / gains.integral - gains.damping * speed - gains.spring * e
     speed = speed + (T / gains.mass) * push  # eq. (1), (2)
     e = e + T * speed  # eq. (3)
-    made = fast_filter(1.0, T)  # the same for any tau
     delta, rate = made.transition @ rows[3:5] + np.outer(made.response, e)  # eq. (10)
     sent = np.vstack([delta, rows[5:-3]])
     before, now, then = sent[whole + 2], sent[whole + 1], sent[whole]
@@ -88,9 +87,12 @@ def loop_matrix(gains: ForceGains, stiffness: float, delay: float, tool: float =
     return matrix if np.isfinite(gains.integral) else matrix[1:, 1:]
 
 
-def _parts(delay: float, period: float) -> tuple[float, float]:
+def _parts(delay: float, period: float, filter_: Filter) -> tuple[float, float]:
     """Dead time and lag of the arm in a loop of this delay, s; the damping shortens what is met."""
-    arm = max(delay + LOSS - (_FILTER + _READ) * period, 0.0)
+    # What the filter's step response is short of 1, summed up.
+    left = np.linalg.inv(np.eye(2) - filter_.transition)
+    late = float((left @ filter_.transition @ left @ filter_.response)[0])
+    arm = max(delay + LOSS - (late + _READ) * period, 0.0)
     lag = min(arm, LAG)
     return arm - lag, max(lag, period / _WITHIN)
 

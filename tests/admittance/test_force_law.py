@@ -32,7 +32,11 @@ def measured_delay(cycles):
 
     The plant takes up a set-point a cycle after it came, and so many more.
     """
-    return (0.5185 + 0.25 + 1.0 + cycles) * PERIOD + LAG
+    filter_, delta, late = fast_filter(5.0, PERIOD), (0.0, 0.0), 0.0
+    for _ in range(50):
+        delta = follow(filter_, delta, 1.0)
+        late += 1.0 - delta[0]
+    return (late + 0.25 + 1.0 + cycles) * PERIOD + LAG
 
 
 def swings_of(gains, stiffness, cycles, mass, seconds=10.0):
