@@ -20,6 +20,8 @@ _MORE, _CYCLES, _FASTEST = 0.5, 2.0, 20.0
 _USUAL = 5.0
 # Of an oscillation: alternations within so many delays, of a share of the set-point, or N.
 _SWINGS, _WITHIN, _SWING_SHARE, _SWING = 6, 20.0, 0.3, 0.5
+# What a friction that is known may be off by, and a tilt may add.
+_RUBS = 0.2
 # Saturation is told once it has lasted so long, s.
 _SATURATED = 0.1
 
@@ -122,7 +124,7 @@ class HeldForce(ContactCourse):
         self._swings.reset()
         self._become(before, t)
 
-    def _guard(self, t: float, force: float, across: float, wanted: float) -> None:
+    def _guard(self, t: float, force: float, across: float, wanted: float, friction: float) -> None:
         """Stop at once at a force that the tool must not meet."""
         policy = self.policy
         most = policy.limit * max(wanted, 2.0 * policy.contact)
@@ -138,13 +140,13 @@ class HeldForce(ContactCourse):
                 "loop can follow",
                 urgent=True,
             )
-        elif across > policy.drag + policy.rub * max(force, 0.0):
+        elif across > policy.drag + max(policy.rub, friction + _RUBS) * max(force, 0.0):
             self.across = across
             self.fail(
                 t,
                 "too hard",
                 f"{across:.1f} N across the normal beside {force:.1f} N along it: the tool has met "
-                "a wall or an edge",
+                "a wall or an edge, or rubs harder than coupling_drag and coupling_rub allow",
                 urgent=True,
             )
 

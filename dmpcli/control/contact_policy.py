@@ -49,7 +49,7 @@ class ContactPolicy:
         Largest force along the normal, times the set-point.
     drag, rub : float
         Force across the normal that is no friction any more: more than `drag` N and `rub` times
-        the normal force.
+        the normal force, or 0.2 more than the friction that was felt times it.
     patience : float
         s without contact until it counts as lost.
     on_loss : {'seek', 'hold', 'stop'}

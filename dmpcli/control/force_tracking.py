@@ -162,7 +162,7 @@ class ForceTracker:
         normal = x, y, z = self.sense.normal(planned)
         force = dot(felt, normal)
         side = math.hypot(fx - force * x, fy - force * y, fz - force * z)
-        supervisor.step(t, force, side, wanted)
+        supervisor.step(t, force, side, wanted, self.sense.friction)
         if index > plan.lead and wanted > 0.0:
             touching = force > min(supervisor.policy.contact, wanted / 2.0)
             self.tally.add(force, wanted, touching and not supervisor.doubted, supervisor.saturated)

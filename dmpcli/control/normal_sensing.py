@@ -57,6 +57,11 @@ class NormalSense:
         """Unit normal, shape (3,), base axes; None where nothing is known."""
         return None if self._found is None else np.array(self._found)
 
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient; 0 where it was not felt yet."""
+        return 0.0 if self._found is None else self._estimator.friction
+
     def begin(self) -> None:
         """Get ready for the next stroke: of the surface elsewhere only its friction is known."""
         self._estimator = NormalEstimator(self._period, self._estimator.friction)

@@ -204,6 +204,15 @@ def test_a_side_force_that_is_no_friction_is_a_wall():
     assert "wall" in rig.supervisor.failure
 
 
+@pytest.mark.parametrize(("friction", "stops"), [(0.0, True), (0.2, True), (0.5, False)])
+def test_where_much_friction_was_felt_more_of_it_is_no_wall(friction, stops):
+    rig = Rig(Plant(2.0, 1)).land()
+    rig.supervisor.step(rig.t, 5.0, 4.3, 5.0, friction)
+    assert bool(rig.supervisor.failure) == stops
+    rig.supervisor.step(rig.t, 5.0, 5.6, 5.0, friction)
+    assert rig.supervisor.urgent
+
+
 def test_chosen_gains_that_the_contact_would_make_swing_are_refused_at_the_landing():
     gains = ForceGains(PERIOD * 0.1, 0.1, 0.0, np.inf, PERIOD)
     rig = Rig(Plant(5.0, 2), gains=gains).land()
