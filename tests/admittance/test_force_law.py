@@ -12,9 +12,16 @@ from dmpcli.admittance.contact_estimation import (
     static_stiffness,
 )
 from dmpcli.admittance.force_coupling import fast_filter, follow
-from dmpcli.admittance.force_law import ForceGains, LawState, advance, by_rule
+from dmpcli.admittance.force_law import (
+    INTEGRAL_DELAYS,
+    ForceGains,
+    LawState,
+    advance,
+    by_rule,
+)
 from dmpcli.admittance.force_stability import (
     LAG,
+    MARGIN,
     growth,
     is_safe,
     is_stable,
@@ -67,6 +74,38 @@ def test_the_predicted_bound_is_where_the_loop_of_an_arm_in_small_steps_begins_t
         gains = ForceGains(PERIOD * D, D, 0.0, math.inf, PERIOD)
         early, late = swings_of(gains, stiffness, cycles, mass)
         assert (late > early) == grows
+
+
+# Stiffness, N/mm; delay that the rule took and the one measured, s; and the damping, as a share of
+# stiffness times the first, below which the bench's physics began to swing.
+MET = [
+    (0.49, 0.055, 0.029, 0.41),
+    (0.49, 0.075, 0.049, 0.39),
+    (0.49, 0.095, 0.069, 0.26),
+    (0.49, 0.135, 0.109, 0.51),
+    (1.9, 0.055, 0.032, 0.1),
+    (1.9, 0.075, 0.052, 0.41),
+    (1.9, 0.095, 0.072, 0.53),
+    (1.9, 0.135, 0.112, 0.62),
+    (4.43, 0.055, 0.032, 0.32),
+    (4.43, 0.075, 0.052, 0.48),
+    (4.43, 0.095, 0.072, 0.56),
+    (4.43, 0.135, 0.112, 0.62),
+    (13.24, 0.055, 0.027, 0.37),
+    (13.24, 0.075, 0.049, 0.51),
+    (13.24, 0.095, 0.069, 0.56),
+    (11.03, 0.135, 0.101, 0.72),
+]
+
+
+@pytest.mark.parametrize(("stiffness", "taken", "late", "met"), MET)
+def test_what_is_refused_lies_within_a_factor_of_two_of_what_physics_shows(
+    stiffness, taken, late, met
+):
+    """A tool of 6 N; nobody has told of the arm's lag, or of what the pen's holder damps."""
+    integral = INTEGRAL_DELAYS * taken
+    bound = smallest_damping(stiffness, late, PERIOD, integral, 6e-3 / 9.80665)
+    assert 0.5 < MARGIN * bound / (stiffness * taken) / met < 2.0
 
 
 @pytest.mark.slow
