@@ -12,6 +12,8 @@ from dmpcli.control.landing import Landing
 _LONGEST = 60.0
 # Of what a delay is measured at, no more than this is believed, s.
 _LATEST = 0.5
+# No nearer than this to a set-point is asked of a reading, N.
+_NOISE = 0.15
 # Fastest that is looked for a surface whose stiffness is known, mm/s, and the force it may cost.
 _KNOWN, _COST = 8.0, 0.4
 
@@ -131,7 +133,7 @@ class SoughtSurface(HeldForce):
 
     def _settle(self, t: float, force: float, wanted: float) -> None:
         self._hold_force(t, force, wanted)
-        near = abs(force - wanted) <= NEAR * wanted
+        near = abs(force - wanted) <= max(NEAR * wanted, _NOISE)
         self._near = self._near + self._period if near else 0.0
         if self._settled:
             if force >= 0.5 * wanted:

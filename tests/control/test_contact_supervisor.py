@@ -69,6 +69,18 @@ def test_a_surface_off_the_plan_is_landed_on_gently(height, stiffness):
     assert rig.states == ["free", "seeking", "landing", "drawing"]
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 10.0])
+@pytest.mark.parametrize("wanted", [0.5, 1.0, 2.0])
+def test_a_small_force_is_landed_on_as_surely_whatever_the_noise(wanted, stiffness, seed):
+    """A slope of what has risen by no more than the noise would press anywhere, or nowhere."""
+    rig = Rig(Plant(stiffness, 1, seed=seed, surface=lambda t: -1.0), setpoint=wanted).land(90.0)
+    assert rig.supervisor.settled
+    assert rig.peak <= 1.5 * wanted
+    # Beside a noise of 0.05 N.
+    assert rig.supervisor.stiffness == pytest.approx(stiffness, rel=0.15 if wanted > 0.7 else 0.4)
+
+
 @pytest.mark.parametrize("bias", [-1.2, 1.2])
 def test_a_zero_that_is_off_is_taken_anew_before_contact(bias):
     rig = Rig(Plant(2.0, 1, bias=bias))
