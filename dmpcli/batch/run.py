@@ -174,6 +174,11 @@ class Batch:
         RefusedError, InputError
             As `run`.
         """
+        # Rows that were refused before are done, and those of other shards are nobody's here.
+        parts = range(self.first_part, self.first_part + self.cut.count)
+        ours = np.array([self.shard.has(number) for number in parts], dtype=bool)[self.cut.part]
+        refused = int((ours & ~self._admitted).sum())
+        advance(refused, refused, left_out=int((~ours).sum()))
         kept = folder.kept(self.sizes, self._hashes)
         summary.kept += len(kept)
         for outcome in self._all(kept, draw):

@@ -370,9 +370,10 @@ def _compared(parts: list[DocumentPart]) -> list[DocumentPart]:
         if part.run is not None:
             found = pose_errors.followed(part.run, part.name)
         elif part.recorded and part is not recorded[0]:
-            found = pose_errors.compared(
-                part.name, recorded[0].name, *_by_one_clock(part.recorded, recorded[0])
-            )
+            here, there = _by_one_clock(part.recorded, recorded[0])
+            found = pose_errors.compared(part.name, recorded[0].name, here, there)
+            if found is None:
+                tell(pose_errors.apart(part.name, recorded[0].name, here, there))
         elif len(part.strokes) == 1 and not recorded and part is not planned[0]:
             first = planned[0]
             if len(first.strokes) == 1:

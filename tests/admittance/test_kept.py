@@ -68,8 +68,11 @@ def forces_under_control():
             force_stability.is_stable(gains, s, delay) for s in (0.5 * stiffness, 9.0 * stiffness)
         ]
         found += [
-            force_stability.largest_stiffness(gains, delay),
-            force_stability.loop_matrix(gains, stiffness, delay),
+            force_stability.is_safe(gains, s, delay, 0.6e-3) for s in (stiffness, 9.0 * stiffness)
+        ]
+        found += [
+            force_stability.loop_matrix(gains, stiffness, delay, 0.6e-3),
+            force_stability.steadied(gains.softened(0.3), stiffness, delay, 0.6e-3),
         ]
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02))
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02, 4.0))
