@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.batch.site import Prepare, Prepared, Remark, Site
+from dmpcli.batch.site import Prepare, PreparedSite, Remark, Site
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import DrawnBlock, DrawnStroke, GeneralizeOptions
 from dmpcli.dmp.generalization import draw, draw_blocks
@@ -370,13 +370,13 @@ def _where(task: Task) -> tuple[Surface | None, GeneralizeOptions]:
     return task.surface, task.style
 
 
-def _placed(one: Prepared, rows: Integers) -> dict[int, list[float]]:
+def _placed(one: PreparedSite, rows: Integers) -> dict[int, list[float]]:
     """Start, goal and a plane's normal of each pair, by its row."""
     ends = np.hstack([one.start, one.goal]).tolist()
     return {row: place + (one.normal or []) for row, place in zip(rows.tolist(), ends, strict=True)}
 
 
-def _facts_of(one: Prepared) -> dict[str, Any]:
+def _facts_of(one: PreparedSite) -> dict[str, Any]:
     """What strokes say of their skill: turned over where all of them are."""
     skill, style = one.task.skill, one.task.style
     if one.turned:

@@ -110,7 +110,7 @@ class PairSites:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedSite:
     """Pairs of one site, ready to be drawn.
 
     Attributes
@@ -158,7 +158,7 @@ class Remark:
     text: str
 
 
-Prepare = Callable[[Site, list[str], Pairs, Floats], tuple[Prepared, list[Remark]]]
+Prepare = Callable[[Site, list[str], Pairs, Floats], tuple[PreparedSite, list[Remark]]]
 """Makes the pairs of one site ready, with ids (n,) and durations (n,), s; raises what a user can
 mend: then none of them can be drawn."""
 

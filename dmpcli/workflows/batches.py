@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from dmpcli.batch.part import Job
-from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, Shard, Summary, run
+from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, BatchSummary, Shard, run
 from dmpcli.batch.site import SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.feasibility import snapped
@@ -81,7 +81,7 @@ def write_pieces(
     )
 
 
-def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> Summary:
+def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> BatchSummary:
     """Draw the batch into a folder; return what was drawn.
 
     Raises
@@ -98,7 +98,7 @@ def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> Summary:
 
 def _drawn(
     readies: Iterator[Ready], output: Location, wanted: BatchOptions, nested: bool, total: int
-) -> Summary:
+) -> BatchSummary:
     with _workers(wanted) as draw_with, progress("drawing", total) as advance:
         return run(_batches(readies, output, wanted, nested), draw_with, advance)
 
@@ -206,7 +206,7 @@ def _tell_of_sites(told: SitesTold) -> None:
         tell(f"and {len(loud) - SHOWN} more remarks on surfaces")
 
 
-def _tell(name: str, output: Location, shard: Shard, summary: Summary) -> None:
+def _tell(name: str, output: Location, shard: Shard, summary: BatchSummary) -> None:
     _tell_of_sites(summary.told)
     if summary.unfolded:
         warn(

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.batch.site import PairSites, Prepared, Remark, Site, SiteFile
+from dmpcli.batch.site import PairSites, PreparedSite, Remark, Site, SiteFile
 from dmpcli.batch.task import Task
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.drawn_strokes import OnBorder
@@ -283,7 +283,7 @@ class SiteWork:
 
     def __call__(
         self, site: Site, ids: list[str], pairs: Pairs, duration: Floats
-    ) -> tuple[Prepared, list[Remark]]:
+    ) -> tuple[PreparedSite, list[Remark]]:
         """Read the site's surface, and hold the pairs against it.
 
         Raises
@@ -316,7 +316,7 @@ class SiteWork:
         start[good], goal[good] = ends(skill, on[good], given, style.turn)
         task = Task(skill.plain(), given, style, self.reach, asked(settings.event or ()))
         return (
-            Prepared(
+            PreparedSite(
                 task,
                 on,
                 start,

@@ -1,5 +1,7 @@
 """`inspect`: what a file is, and of a batch's folder its table."""
 
+import shlex
+
 import numpy as np
 
 from dmpcli.errors import InputError
@@ -52,13 +54,15 @@ def _rooms(file: str, found: Row, skill: Location) -> list[str]:
         raise InputError(f"--for: {file} is no mesh, so that nothing is drawn on it; leave it out")
     learned = learned_skill.read(file_io.read(skill))
     read = surface_input.read(located(file), None, None)
-    places = room_for.rooms_for(read, learned)
-    if places:
-        return [f"room for {skill}: {mesh.as_options(place)}" for place in places]
+    rooms = room_for.rooms_for(read, learned)
+    if rooms:
+        line = f"dmpcli generalize {shlex.quote(str(skill))} -o stroke.parquet"
+        line += f" --surface {shlex.quote(file)} {rooms[0].words()}"
+        told = [f"room for {skill}: {one.words()}  {mesh.what(one.patch)}" for one in rooms]
+        return [*told, f"  {line} --ease-in 0.5 --ease-out 0.5"]
     room = room_for.footprint(learned)
     along, across = np.ptp(room.path, axis=0)
     return [
         f"room for {skill}: on none of its smooth patches ({along:.0f} mm along, {across:.0f} mm "
-        "across); --amplitude scale makes a shorter stroke lower, and over rounded edges one may "
-        "be drawn all the same"
+        "across), nor for a quarter of its size; over rounded edges it may be drawn all the same"
     ]

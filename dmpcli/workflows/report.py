@@ -39,7 +39,7 @@ from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows import recording
-from dmpcli.workflows.report_jobs import Processes
+from dmpcli.workflows.report_jobs import ReportProcesses
 from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -341,7 +341,7 @@ def _measured(
     parts: list[DocumentPart], sight: MeasurementContext, tables: Tables | None, jobs: int
 ) -> list[DocumentPart]:
     """Measure large batches, and write down the wave heights of all strokes."""
-    elsewhere = Processes(jobs) if jobs > 1 else None
+    elsewhere = ReportProcesses(jobs) if jobs > 1 else None
     done = []
     total = sum(len(part.batch) for part in parts if part.batch)
     with progress("measuring", total) as advance:
@@ -370,9 +370,10 @@ def _compared(parts: list[DocumentPart]) -> list[DocumentPart]:
         if part.run is not None:
             found = pose_errors.followed(part.run, part.name)
         elif part.recorded and part is not recorded[0]:
-            found = pose_errors.compared(
-                part.name, recorded[0].name, *_by_one_clock(part.recorded, recorded[0])
-            )
+            here, there = _by_one_clock(part.recorded, recorded[0])
+            found = pose_errors.compared(part.name, recorded[0].name, here, there)
+            if found is None:
+                tell(pose_errors.apart(part.name, recorded[0].name, here, there))
         elif len(part.strokes) == 1 and not recorded and part is not planned[0]:
             first = planned[0]
             if len(first.strokes) == 1:
