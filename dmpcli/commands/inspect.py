@@ -19,7 +19,7 @@ def command(
         str | None,
         typer.Argument(
             metavar="FILE",
-            help="A file of ours, a mesh, or a CSV or Parquet from elsewhere, here or in s3://; - is "
+            help="A file of ours, a mesh, or a CSV or Parquet from elsewhere, of s3:// too; - is "
             "standard input.",
             show_default=False,
         ),

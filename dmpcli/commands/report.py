@@ -20,8 +20,8 @@ def command(
         list[str],
         typer.Argument(
             metavar="FILE",
-            help="Demonstrations, trajectories, batch folders, runs and skills, here or in s3://; - "
-            "is standard input. The first demonstration is what the others are compared with.",
+            help="Demonstrations, trajectories, batch folders, runs and skills, of s3:// too; - is "
+            "standard input. The first demonstration is what the others are compared with.",
             show_default=False,
         ),
     ],
