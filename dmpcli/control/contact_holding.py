@@ -20,6 +20,8 @@ _MORE, _CYCLES, _FASTEST = 0.5, 2.0, 20.0
 _USUAL = 5.0
 # Of an oscillation: alternations within so many delays, of a share of the set-point, or N.
 _SWINGS, _WITHIN, _SWING_SHARE, _SWING = 6, 20.0, 0.3, 0.5
+# The same in standard deviations of the noise, where that is more.
+_SWING_NOISE = 8.0
 # What a friction that is known may be off by, and a tilt may add.
 _RUBS = 0.2
 # Saturation is told once it has lasted so long, s.
@@ -103,7 +105,7 @@ class HeldForce(ContactCourse):
     def _listen(self, t: float, error: float, wanted: float) -> None:
         """Soften the gains of a loop that swings, once; stop one that swings on."""
         if self._swings is None:
-            size = max(_SWING_SHARE * wanted, _SWING)
+            size = max(_SWING_SHARE * wanted, _SWING, _SWING_NOISE * self.noise)
             window = _WITHIN * (self._known_delay + self._period)
             self._swings = AlternationDetector(size, _SWINGS, window)
         if not (self._swings.feel(t, error) and self._swings.grows):

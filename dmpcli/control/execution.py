@@ -361,7 +361,7 @@ def pressed(pressing: ForceTracker) -> str:
         )
     if pressing.wall is not None:
         said += f"; ended by a wall: {pressing.wall}"
-    if found.get("zero_drift", 0.0) > DRIFTED:
+    if found.get("zero_drift", 0.0) > max(DRIFTED, 3.0 * pressing.supervisor.noise):
         said += (
             f"; the force's zero has moved by {found['zero_drift']:.2f} N since it was taken, and "
             "so has the force that was held: calibrate anew, or let the sensor warm up"

@@ -81,6 +81,27 @@ def test_a_small_force_is_landed_on_as_surely_whatever_the_noise(wanted, stiffne
     assert rig.supervisor.stiffness == pytest.approx(stiffness, rel=0.15 if wanted > 0.7 else 0.4)
 
 
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("noise", [0.2, 0.5])
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 10.0])
+def test_a_sensor_that_scatters_is_judged_by_its_own_noise(stiffness, noise, seed):
+    """Half a newton, as of sensors that arms have built in, is no touch, no swing and no loss."""
+    rig = Rig(Plant(stiffness, 1, seed=seed, noise=noise, surface=lambda t: -1.0)).land()
+    pairs = rig.draw(4.0)
+    assert rig.states[-1] == "drawing"
+    assert set(rig.states) == {"free", "seeking", "landing", "drawing"}
+    assert rig.supervisor.noise == pytest.approx(noise, rel=0.5)
+    assert rig.supervisor.stiffness == pytest.approx(stiffness, rel=0.25)
+    assert rig.peak <= 1.5 * 5.0
+    assert abs(pairs[:, 0].mean() - 5.0) < noise
+
+
+def test_a_set_point_within_the_noise_is_refused_before_anything_touches():
+    rig = Rig(Plant(2.0, noise=0.5), setpoint=1.0).land()
+    assert "too much to feel 1 N by" in rig.supervisor.failure
+    assert rig.peak == 0.0
+
+
 @pytest.mark.parametrize("bias", [-1.2, 1.2])
 def test_a_zero_that_is_off_is_taken_anew_before_contact(bias):
     rig = Rig(Plant(2.0, 1, bias=bias))
