@@ -30,7 +30,7 @@ HOWS, ROUNDS = ((False,), (True,), (True, True)), 3
 @contextlib.contextmanager
 def stopwatch() -> Iterator[list[float]]:
     """Note the time at each set-point that is sent, s; the bench's own does not count."""
-    went_on, sent = driver.Bench.go_on, driver.BenchArm.send
+    went_on, sent = driver.Bench.go_on, driver.BenchDriver.send
     own, noted = [0.0], []
 
     def go_on(self: driver.Bench) -> None:
@@ -38,15 +38,15 @@ def stopwatch() -> Iterator[list[float]]:
         went_on(self)
         own[0] += time.thread_time() - begun
 
-    def send(self: driver.BenchArm, target: Floats) -> bool:
+    def send(self: driver.BenchDriver, target: Floats) -> bool:
         noted.append(time.thread_time() - own[0])
         return sent(self, target)
 
-    driver.Bench.go_on, driver.BenchArm.send = go_on, send  # type: ignore[method-assign]
+    driver.Bench.go_on, driver.BenchDriver.send = go_on, send  # type: ignore[method-assign]
     try:
         yield noted
     finally:
-        driver.Bench.go_on, driver.BenchArm.send = went_on, sent  # type: ignore[method-assign]
+        driver.Bench.go_on, driver.BenchDriver.send = went_on, sent  # type: ignore[method-assign]
 
 
 def cycles(arm: str, coupled: bool, used: bool = False) -> Floats:

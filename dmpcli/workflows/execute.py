@@ -315,7 +315,7 @@ def check_output(request: ExecutionRequest, repeatable: bool) -> None:
         return
     if request.output is not None:
         suffixes.check(request.output, suffixes.PARQUET)
-        file_io.check_writable(request.output)
+        file_io.check_writable(request.output, here=True)
     why, remedy = "a run cannot be made again", "--force replaces it"
     refuse_replacing(request.output, repeatable, request.force, why, remedy)
 

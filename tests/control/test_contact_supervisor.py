@@ -1,7 +1,9 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from dmpcli.admittance.force_law import ForceGains
+from dmpcli.admittance.force_law import ForceGains, by_rule
 from dmpcli.control.contact_policy import ContactEvent, course
 from tests.control.contact_plant import PERIOD, Plant, Rig
 
@@ -342,6 +344,153 @@ def test_a_second_landing_on_what_is_known_is_quicker():
     while not rig.supervisor.settled:
         rig.cycle()
     assert rig.t - begun < 0.75 * first
+
+
+def at_work(**policy):
+    """A supervisor that draws at 5 N on 2 N/mm, told forces directly."""
+    rig = Rig(Plant(2.0, noise=0.0), **policy).land()
+    assert rig.supervisor.state == "drawing"
+    return rig.supervisor, rig.t
+
+
+@pytest.mark.parametrize(
+    ("force", "wanted", "fails"),
+    [(10.0, 5.0, False), (10.01, 5.0, True), (2.0, 0.6, False), (2.01, 0.6, True)],
+)
+def test_twice_the_set_point_or_four_times_the_threshold_is_too_hard(force, wanted, fails):
+    """A light set-point is let swing up to twice that of twice the threshold, 0.5 N."""
+    supervisor, t = at_work()
+    supervisor.step(t, force, 0.0, wanted)
+    assert supervisor.urgent is fails
+    assert bool(supervisor.failure) is fails
+
+
+@pytest.mark.parametrize(("force", "fails"), [(15.0, False), (15.01, True)])
+def test_a_landing_may_meet_half_as_much_again(force, fails):
+    rig = Rig(Plant(2.0, noise=0.0))
+    while rig.supervisor.state != "landing":
+        rig.cycle()
+    rig.supervisor.step(rig.t, force, 0.0, 5.0)
+    assert rig.supervisor.urgent is fails
+
+
+@pytest.mark.parametrize("lost", [3, 4])
+def test_contact_is_lost_after_more_than_its_patience(lost):
+    """60 ms: three cycles without a force are waited out, a fourth is not."""
+    supervisor, t = at_work(on_loss="hold", patience=0.061)
+    e = supervisor.e
+    for k in range(lost):
+        supervisor.step(t + 0.02 * k, 0.5, 0.0, 5.0)
+    assert (supervisor.state == "lost") is (lost > 3)
+    # Meanwhile the tool is held where it is.
+    assert supervisor.e == e
+    supervisor.step(t, 5.0, 0.0, 5.0)
+    supervisor.step(t, 0.5, 0.0, 5.0)
+    assert supervisor.state != "seeking"
+
+
+def test_two_cycles_with_a_force_are_a_contact_again_and_one_is_not():
+    supervisor, t = at_work(on_loss="hold", patience=0.0)
+    supervisor.step(t, 0.0, 0.0, 5.0)
+    assert supervisor.state == "lost"
+    for force in (1.0, 0.2, 1.0):
+        supervisor.step(t, force, 0.0, 5.0)
+        assert supervisor.state == "lost"
+    supervisor.step(t, 1.0, 0.0, 5.0)
+    assert supervisor.state == "landing"
+    supervisor.step(t, 2.5, 0.0, 5.0)
+    assert supervisor.state == "drawing"
+
+
+def test_lost_it_is_sought_downwards_by_so_much_and_no_further():
+    supervisor, t = at_work(again=1.5, patience=0.0)
+    supervisor.step(t, 0.0, 0.0, 5.0)
+    assert supervisor.state == "seeking"
+    lost = supervisor.e
+    for k in range(200):
+        supervisor.step(t + 0.02 * k, 0.0, 0.0, 5.0)
+        if supervisor.failure:
+            break
+    assert "not found again within 1.5 mm" in supervisor.failure
+    assert not supervisor.urgent
+    # Within a cycle's way of looking for it.
+    assert lost - 1.5 - 0.17 <= supervisor.e <= lost - 1.5 + 1e-9
+
+
+def test_how_fast_a_surface_is_looked_for():
+    """At the guarded speed, by 0.4 of a light set-point in a second, or by what its delay costs."""
+    for setpoint, policy, speed in (
+        (5.0, {}, 2.0),
+        (2.5, {}, 1.0),
+        (5.0, {"stiffness": 10.0, "whole_delay": 0.1}, 1.0),
+        (5.0, {"stiffness": 0.5, "whole_delay": 0.1}, 8.0),
+        (5.0, {"stiffness": 2.0, "whole_delay": 0.1}, 5.0),
+        (5.0, {"stiffness": 50.0, "whole_delay": 0.1, "seek": 0.1}, 0.2),
+    ):
+        supervisor = Rig(Plant(2.0), setpoint, **policy).supervisor
+        assert supervisor._speed == pytest.approx(speed), (setpoint, policy)
+
+
+def test_gains_are_those_of_the_rule_for_what_was_measured_said_or_usual():
+    def rule(k, delay, *more):
+        return by_rule(k, delay + PERIOD / 2.0, PERIOD, *more)
+
+    rig = Rig(Plant(2.0, noise=0.0), spring=0.3, tool_mass=2.0).land()
+    found = rig.supervisor
+    assert found.gains == rule(found.stiffness, found.delay, 0.3, 2e-3)
+    rig = Rig(Plant(2.0, noise=0.0), stiffness=3.0, whole_delay=0.09).land()
+    assert rig.supervisor.gains == rule(3.0, 0.09)
+    assert rig.supervisor.stiffness == pytest.approx(2.0, rel=0.02)
+    bare = Rig(Plant(2.0), told_delay=0.04).supervisor
+    bare._choose()
+    assert bare.gains == rule(5.0, 0.04)
+
+
+def test_the_lifted_tool_may_read_its_zero_limit_and_no_more():
+    for size, fails in ((2.0, False), (2.01, True)):
+        supervisor = Rig(Plant(2.0), zero_limit=2.0).supervisor
+        supervisor.zero_is(1.0, size)
+        assert bool(supervisor.failure) is fails
+        assert not supervisor.urgent
+
+
+def test_a_force_that_falls_as_the_tool_is_lifted_is_a_contact():
+    """On a spring that is still pressed: 0.15 N over the last millimetre are allowed."""
+    for stiffness, fails in ((0.14, False), (0.16, True)):
+        rig = Rig(Plant(stiffness, noise=0.0, surface=lambda t: 9.0), zero_limit=100.0)
+        for _ in range(150):
+            rig.cycle()
+            if rig.supervisor.state != "free" or rig.supervisor.failure:
+                break
+        assert bool(rig.supervisor.failure) is fails
+
+
+def test_a_saturation_is_told_once_it_lasts_a_tenth_of_a_second():
+    supervisor, t = at_work(rate=1.0)
+    told = len(supervisor.events)
+    for k in range(4):
+        supervisor.step(t + 0.02 * k, 9.9, 0.0, 5.0)
+        assert supervisor.saturated
+    assert len(supervisor.events) == told
+    for k in range(4, 7):
+        supervisor.step(t + 0.02 * k, 9.9, 0.0, 5.0)
+    [event] = supervisor.events[told:]
+    assert event.detail == "saturated: the correction has reached 1 mm/s (coupling_rate)"
+
+
+def test_after_a_stroke_it_is_lifted_by_the_reach_above_where_it_would_be_unpressed():
+    supervisor, t = at_work(reach=4.0, free=10.0)
+    e, k = supervisor.e, supervisor.stiffness
+    assert not supervisor.retreated
+    way = [e]
+    while not supervisor.retreated:
+        way.append(supervisor.retreat(t))
+    assert way[-1] == pytest.approx(e + 5.0 / k + 4.0)
+    assert max(b - a for a, b in pairwise(way)) <= 10.0 * PERIOD + 1e-9
+    assert supervisor.retreat(t) == way[-1]
+    assert [event.state for event in supervisor.events].count("retreating") == 1
+    supervisor.leaves(t)
+    assert [event.state for event in supervisor.events].count("retreating") == 1
 
 
 def test_each_change_is_named_with_its_time_and_many_are_counted():
