@@ -297,7 +297,7 @@ def policy_of(
     )
 
 
-def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float) -> Filter:
+def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float = 0.0) -> Filter:
     """Return the filter for all strokes of a run: their time constants differ in no case.
 
     Parameters
@@ -370,7 +370,8 @@ def pressed(pressing: ForceTracker) -> str:
         said += f"; at its limits on {100.0 * found['saturated']:.2g} % of the stroke"
     if "oscillating" in {event.state for event in pressing.supervisor.events}:
         said += "; the force swung, and the gains were softened"
-    return f"{said}; contact: {course(pressing.supervisor.events)}"
+    changes = course(pressing.supervisor.events)
+    return f"{said}; contact: {changes}" if changes else said
 
 
 def watch(settings: ExecuteSettings) -> StopLimits:
