@@ -231,3 +231,16 @@ def test_short_approaches_to_a_long_stroke_end_at_its_corner(length):
     found = segments(0.01 * np.arange(len(points)), points)
     assert found.approach == (0.0, pytest.approx(0.2, abs=0.03))
     assert found.retract == (pytest.approx(12.19, abs=0.03), pytest.approx(12.39))
+
+
+@pytest.mark.parametrize(("bottom", "told"), [(25.0, False), (30.0, False), (33.0, True)])
+def test_between_two_strays_a_twentieth_of_the_points_must_be_left(bottom, told):
+    """Each of them reaches around its corner as far as a straight line may bend."""
+    V = np.array([[0, 0, 100], [0, 0, 0], [bottom, 0, 0], [bottom, 0, 90]], dtype=float)
+    way = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+    s = way[-1] * jerk(np.arange(301) / 300)
+    found = segments(
+        np.arange(301) / 100, np.column_stack([np.interp(s, way, c) for c in V.T]), DOWN
+    )
+    assert (found.approach is not None) == told
+    assert (found.retract is not None) == told

@@ -201,6 +201,16 @@ def brackets_with_short_bottoms():
 
 
 @case
+def brackets_without_one_of_their_legs():
+    """About where what is left of the points is just enough."""
+    found: list = []
+    for bottom in np.arange(13.0, 19.0, 0.25):
+        x = along([[0, 0, 100], [0, 0, 0], [bottom, 0, 0]], 3.0, soft=False)
+        found += parts([even(x, DOWN), even(x[::-1], DOWN)])
+    return found
+
+
+@case
 def corners_of_all_angles_between_approach_and_stroke():
     found: list = []
     main = cases.wave(np.linspace(0.0, 1.0, 400), 300.0, 40.0)
