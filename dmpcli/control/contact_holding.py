@@ -11,6 +11,8 @@ from dmpcli.control.contact_course import ContactCourse
 NEAR, NEAR_TIME = 0.1, 0.1
 # In a landing the force may be so many times the limit of a stroke: it is met at first sight.
 _LANDING = 1.5
+# An error of more than this share of the set-point is not summed up.
+_STEPS = 0.5
 # Until a landing has come near to its set-point its gains are softened so much.
 _GENTLE = 1.5
 # Where a surface that was lost is met again the force may rise over the set-point by this share of
@@ -78,6 +80,9 @@ class HeldForce(ContactCourse):
             # The last part of a landing is not to overshoot: slower, and with nothing summed up.
             gains = replace(gains.softened(_GENTLE), integral=math.inf)
         made = advance(gains, before, force - wanted, policy.rate)
+        if abs(force - wanted) > _STEPS * wanted:
+            # What has stepped, or was just met, is no slope that the integral has to follow.
+            made = replace(made, integral=before.integral)
         k = self.stiffness or policy.stiffness or _USUAL
         surface = made.e + max(force, 0.0) / k
         if abs(surface) > policy.clamp and surface * made.speed > 0.0:
