@@ -69,7 +69,7 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     def run(**said: Any) -> None:
         log, asked, context = (said.pop(one) for one in ("log", "print_config", "context"))
         as_json = said["as_json"] if own_json else said.pop("as_json")
-        line = shlex.join(["dmpcli", name, *words])
+        line = shlex.join(["dmpcli", name, *map(_printed, words)])
         with logged(log, f"{line} (dmpcli {__version__})"):
             if asked:
                 others = _others(context, getattr(command, "settings", ()))
@@ -83,6 +83,15 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     run.__doc__, run.__module__, run.__name__ = command.__doc__, command.__module__, "command"
     run.__dict__.update(__signature__=inspect.Signature(parameters), __wrapped__=command)
     return run
+
+
+def _printed(word: str) -> str:
+    """Return a word of the command line as a log may keep it: without credentials."""
+    if "://" not in word:
+        return word
+    from dmpcli.records.storage import hidden
+
+    return hidden(word)
 
 
 def _described(
@@ -190,7 +199,9 @@ def outcome(name: str, said: Mapping[str, Any], own_json: bool = False) -> Itera
 
 def _written(output: str) -> Any:
     """Return what ``inspect --json`` says of the output, if it is one file or folder."""
-    if not output or not Path(output).exists():
+    from dmpcli.records.storage import located
+
+    if not output or not (place := located(output)).exists():
         return None
     from dmpcli.reporting import inspection
     from dmpcli.workflows.inspect import inspect as inspected
@@ -198,7 +209,7 @@ def _written(output: str) -> Any:
     try:
         return json.loads(inspection.as_json(inspected(output)))
     except DmpError:  # a file of another program
-        return {"file": output, "bytes": Path(output).stat().st_size}
+        return {"file": output, "bytes": place.stat().st_size}
 
 
 def _print(text: str) -> None:

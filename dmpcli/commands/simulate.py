@@ -75,7 +75,7 @@ def command(
     if drawn is not None:
         if drawn == file_io.DASH:
             raise InputError("--drawn -: standard output holds what is ready; name a file")
-        file_io.check_writable(drawn)
+        file_io.check_writable(drawn, here=True)
     setting, hand = _scene(settings, faults, tool, served.strokes, served.lookahead)
     if surface is not None:
         setting = _on(surface, surface_pose, surface_unit, setting)

@@ -12,7 +12,7 @@ from rich.table import Table
 from dmpcli.arrays import Floats, Integers
 from dmpcli.metrics import pose_error
 from dmpcli.metrics.motion import path_length
-from dmpcli.metrics.pose_error import Alignment, PoseErrors
+from dmpcli.metrics.pose_error import PoseErrors, RigidAlignment
 from dmpcli.records.record import Record
 from dmpcli.reporting import drawing, tables, tracking
 from dmpcli.reporting.gaps import gaps, line
@@ -41,7 +41,7 @@ class Compared:
         Of the whole paths, reference and estimate, mm.
     most : int
         Samples of the shorter one: as many pairs there could be.
-    alignment : Alignment or None
+    alignment : RigidAlignment or None
         What brings the estimate nearest to the reference.
     """
 
@@ -51,7 +51,7 @@ class Compared:
     estimate: Trajectory
     lengths: tuple[float, float]
     most: int
-    alignment: Alignment | None
+    alignment: RigidAlignment | None
 
     @property
     def absolute(self) -> PoseErrors:

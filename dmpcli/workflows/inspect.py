@@ -1,7 +1,6 @@
 """`inspect`: what a file is, and of a batch's folder its table."""
 
 import shlex
-from pathlib import Path
 
 import numpy as np
 
@@ -9,12 +8,13 @@ from dmpcli.errors import InputError
 from dmpcli.messages import tell
 from dmpcli.records import file_io, learned_skill, mesh
 from dmpcli.records.layouts import Layout
+from dmpcli.records.storage import Location, located
 from dmpcli.reporting import inspection
 from dmpcli.reporting.stroke_measures import Row
 
 
 def inspect(
-    file: str, layout: Layout | None = None, options: str = "", skill: Path | None = None
+    file: str, layout: Layout | None = None, options: str = "", skill: Location | None = None
 ) -> Row:
     """Describe a file, and tell what will take its time.
 
@@ -26,7 +26,7 @@ def inspect(
         How a recording of another program is read.
     options : str
         That say it, as they are typed.
-    skill : Path, optional
+    skill : Path or ObjectPath, optional
         What is to be drawn on the mesh that the file is.
 
     Raises
@@ -34,8 +34,8 @@ def inspect(
     InputError
         As `inspection.inspected`.
     """
-    if Path(file).is_dir() and (Path(file) / file_io.TABLE).is_file():
-        file = str(Path(file) / file_io.TABLE)
+    if file != file_io.DASH and (table := located(file) / file_io.TABLE).is_file():
+        file = str(table)
     source = file_io.read(file)
     waiting = mesh.waiting(source)
     if waiting is not None:
@@ -46,14 +46,14 @@ def inspect(
     return found
 
 
-def _rooms(file: str, found: Row, skill: Path) -> list[str]:
+def _rooms(file: str, found: Row, skill: Location) -> list[str]:
     """Say where on a mesh a skill is drawn."""
     from dmpcli.workflows import room_for, surface_input
 
     if "vertices" not in found.get("content", {}):
         raise InputError(f"--for: {file} is no mesh, so that nothing is drawn on it; leave it out")
     learned = learned_skill.read(file_io.read(skill))
-    read = surface_input.read(Path(file), None, None)
+    read = surface_input.read(located(file), None, None)
     rooms = room_for.rooms_for(read, learned)
     if rooms:
         line = f"dmpcli generalize {shlex.quote(str(skill))} -o stroke.parquet"

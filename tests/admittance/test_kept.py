@@ -12,7 +12,9 @@ from dmpcli.admittance import (
     model,
     payload_identification,
 )
+from dmpcli.admittance.normal_estimation import NormalEstimator, carried, turned
 from dmpcli.admittance.oscillation import AlternationDetector
+from dmpcli.errors import DmpError
 from dmpcli.spatial import rotations
 from dmpcli.spatial.wrench import Tool
 from tests.kept import Kept
@@ -66,8 +68,11 @@ def forces_under_control():
             force_stability.is_stable(gains, s, delay) for s in (0.5 * stiffness, 9.0 * stiffness)
         ]
         found += [
-            force_stability.largest_stiffness(gains, delay),
-            force_stability.loop_matrix(gains, stiffness, delay),
+            force_stability.is_safe(gains, s, delay, 0.6e-3) for s in (stiffness, 9.0 * stiffness)
+        ]
+        found += [
+            force_stability.loop_matrix(gains, stiffness, delay, 0.6e-3),
+            force_stability.steadied(gains.softened(0.3), stiffness, delay, 0.6e-3),
         ]
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02))
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02, 4.0))
@@ -120,6 +125,94 @@ def swings():
         found += [told, one.swing, one.grows]
         one.reset()
         found.append(one.swing)
+    return found
+
+
+@KEPT.case
+def tools_that_are_led_fast():
+    found: list = []
+    light = model.AdmittanceLaw(np.full(6, 0.02), np.full(6, 0.1), np.zeros(6), 0.02)
+    bound = model.Bounds(60.0, 400.0, 0.5, 4.0)
+    state = home = model.DragState(np.ones(3), rotations.exp(np.array([0.2, 0, 1.0])), np.zeros(6))
+    for k in range(40):
+        wrench = np.array([9.0, -5.0 * np.cos(0.3 * k), 2.0, 0.4, 0.1 * np.sin(k), -0.3])
+        state = model.move(light, state, wrench, home, bound)
+    found.append(state)
+    for _ in range(9):
+        state = model.brake(light, state, bound)
+        found.append(state)
+    return found
+
+
+@KEPT.case
+def normals_that_are_estimated():
+    found: list = []
+    for seed, friction in ((0, 0.2), (1, 0.6)):
+        r, one = np.random.default_rng(seed), NormalEstimator(0.02, friction)
+        for k in range(40):
+            planned = np.array([np.sin(0.02 * k), 0.3 * np.cos(0.1 * k), 1.0])
+            planned /= np.linalg.norm(planned)
+            push = 5.0 * planned + r.normal(size=3) * (0.3 if k % 7 else 4.0)
+            found.append(one.feel(push, [12.0, 4.0, 1.0] * r.normal(size=3), planned))
+            if k % 5 == 0:
+                found += [one.normal, one.friction, one.angle, one._P, one.heard]
+        one.carry(np.array([0.1, -0.7, 0.2]) / np.sqrt(0.54))
+        found.append(one.normal)
+    for axis in np.eye(3):
+        lean = rotations.exp(0.3 * axis) @ np.array([0.0, 0.6, 0.8])
+        found += [carried(lean, np.array([0.0, 0.6, 0.8]), np.array([0.6, 0.0, 0.8]))]
+        found += [turned(lean, axis, np.array([0.0, 0.6, 0.8]), 0.2, step) for step in (0.05, 9.0)]
+    return found
+
+
+@KEPT.case
+def loops_of_any_delay():
+    found: list = []
+    for delay in (0.013, 0.05, 0.071):
+        for gains in (
+            force_law.ForceGains(0.02, 0.8, 0.3, np.inf, 0.02),
+            force_law.by_rule(4.0, delay, 0.02, 0.1, 0.02),
+        ):
+            found += [gains, force_stability.loop_matrix(gains, 3.0, delay)]
+            found += [force_stability.growth(gains, 3.0, delay)]
+            found += [force_stability.steadied(gains, 30.0, delay, 2e-4)]
+        found.append(force_stability.smallest_damping(3.0, delay, 0.02, 0.4))
+    state, gains = force_law.LawState(0.1, 2.0, 0.05), force_law.by_rule(2.0, 0.06, 0.02)
+    for error, fastest in ((9.0, 1.0), (-9.0, 1.0), (0.3, 50.0), (2.0, 0.5)):
+        state = force_law.advance(gains, state, error, fastest)
+        found.append(state)
+    return found
+
+
+@KEPT.case
+def loads_of_few_or_bad_poses():
+    r = rng()
+    found: list = []
+    for n, tilt in ((3, 0.8), (5, 0.5), (7, 0.9), (12, 1.1)):
+        R = rotations.exp(tilt * r.normal(size=(n, 3)))
+        force = np.einsum("kji,j->ki", R, np.array([0.4, 0.3, -5.0]))
+        sensed = np.hstack([force, np.cross([0.002, 0.001, 0.03], force)]) + 0.3
+        sensed += 0.01 * r.normal(size=sensed.shape)
+        sensed[n // 2] += [0.4, 0.0, -0.3, 0.02, 0.0, 0.05]
+        for t in (None, np.cumsum(r.uniform(0.1, 0.3, n)), np.zeros(n)):
+            try:
+                found.append(payload_identification.identify(R, sensed, t))
+            except DmpError as error:
+                found.append(str(error))
+    for R in (
+        rotations.exp(np.linspace(0.0, 1.5, 6)[:, None] * [0.2588, 0.9659, 0.0]),
+        rotations.exp(0.05 * r.normal(size=(5, 3))),
+        rotations.exp(np.array([[0.0, 0, 0], [0.5, 0, 0]])),
+    ):
+        try:
+            payload_identification.check_orientations(R)
+        except DmpError as error:
+            found.append(str(error))
+    light = np.random.default_rng(3).normal(size=(8, 6))
+    try:
+        payload_identification.solve(rotations.exp(r.normal(size=(8, 3))), light)
+    except DmpError as error:
+        found.append(str(error))
     return found
 
 

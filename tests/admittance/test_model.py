@@ -182,3 +182,45 @@ def test_braking_comes_to_rest_in_the_time_that_the_bound_allows():
     for _ in range(5):
         pose = brake(DRAG, pose, bounds)
     np.testing.assert_allclose(pose.velocity, 0.0, atol=1e-12)
+
+
+def test_braking_takes_the_whole_bound_and_no_more_in_every_step():
+    """100 mm/s at 1000 mm/s² and 1.2 rad/s at 10 rad/s²: 20 mm/s and 0.2 rad/s a period."""
+    bounds = Bounds(100.0, 1000.0, 1.0, 10.0)
+    pose = DragState(np.zeros(3), PEN_DOWN, np.array([60.0, 80.0, 0.0, 0.0, 0.0, 1.2]))
+    speeds, turning = [], []
+    for _ in range(7):
+        before, pose = pose, brake(DRAG, pose, bounds)
+        speeds.append(np.linalg.norm(pose.velocity[:3]))
+        turning.append(np.linalg.norm(pose.velocity[3:]))
+        np.testing.assert_allclose(pose.position, before.position + 0.02 * pose.velocity[:3])
+        turned = log(pose.rotation @ before.rotation.T)
+        np.testing.assert_allclose(turned, 0.02 * pose.velocity[3:], atol=1e-12)
+    np.testing.assert_allclose(speeds, [80.0, 60.0, 40.0, 20.0, 0.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(turning, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(pose.position[:2], 0.02 * 200.0 * np.array([0.6, 0.8]))
+
+
+@given(st.integers(0, 10_000))
+def test_a_step_with_bounds_is_the_free_one_shortened_first_in_acceleration_then_in_speed(seed):
+    rng = np.random.default_rng(seed)
+    law = AdmittanceLaw(*rng.uniform(0.1, 2.0, (3, 6)), 0.02)
+    bounds = Bounds(*rng.uniform([5.0, 50.0, 0.2, 2.0], [50.0, 500.0, 2.0, 20.0]))
+    home = DragState(rng.standard_normal(3), exp(0.3 * rng.standard_normal(3)), np.zeros(6))
+    pose = DragState(
+        20.0 * rng.standard_normal(3), exp(rng.standard_normal(3)), 10.0 * rng.standard_normal(6)
+    )
+    wrench = 200.0 * rng.standard_normal(6)
+    off = np.concatenate([pose.position - home.position, log(pose.rotation @ home.rotation.T)])
+    a = (wrench - law.damping * pose.velocity - law.stiffness * off) / law.mass
+    limits = ((bounds.acceleration, bounds.turning_acceleration), (bounds.speed, bounds.turning))
+    halves = (slice(0, 3), slice(3, 6))
+    for half, most in zip(halves, limits[0], strict=True):
+        a[half] *= min(1.0, most / np.linalg.norm(a[half]))
+    v = pose.velocity + 0.02 * a
+    for half, most in zip(halves, limits[1], strict=True):
+        v[half] *= min(1.0, most / np.linalg.norm(v[half]))
+    made = move(law, pose, wrench, home, bounds)
+    np.testing.assert_allclose(made.velocity, v, atol=1e-9)
+    np.testing.assert_allclose(made.position, pose.position + 0.02 * v[:3], atol=1e-9)
+    np.testing.assert_allclose(made.rotation, exp(0.02 * v[3:]) @ pose.rotation, atol=1e-9)

@@ -13,7 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def angle(a, b):
-    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b)))
 
 
 def slid(normal, mu, path, seed=0, noise=0.05, push=5.0, knocks=0):
@@ -97,7 +97,7 @@ def test_a_lean_is_carried_with_the_planned_normal_round_a_cylinder():
         return np.array([np.sin(phi), 0.0, np.cos(phi)])
 
     for axis in (np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
-        made = exp(lean * axis) @ UP
+        made = tuple(exp(lean * axis) @ UP)
         for before, now in pairwise(way):
             made = carried(made, round_(before), round_(now))
         assert np.linalg.norm(made) == pytest.approx(1.0)
@@ -129,3 +129,98 @@ def test_planned_normals_that_point_anywhere_have_axes():
         for _ in range(100):
             estimator.feel(R @ [-1.0, 0.0, 5.0], R @ [20.0, 0.0, 0.0], n)
         assert angle(estimator.normal, n) < 0.5
+
+
+class Textbook:
+    """The filter of the note as matrices: a walk of three unknowns, three equations a cycle.
+
+    By a planned normal along z the tangents are x and y. An equation that is missed by more than
+    three deviations counts as one of so much larger variance.
+    """
+
+    def __init__(self, friction=0.2):
+        self.x = np.array([0.0, 0.0, friction])
+        self.P = np.diag([0.1**2, 0.1**2, 0.15**2])
+        self.Q = np.diag([0.05**2, 0.05**2, 0.02**2]) * PERIOD
+
+    def feel(self, force, velocity):
+        speed = np.hypot(*velocity[:2])
+        s, push = velocity[:2] / speed, force[2]
+        self.P = self.P + self.Q
+        by_force = (0.1 / push) ** 2 + 0.01**2
+        by_motion = (0.5 / speed) ** 2 + 0.01**2
+        for h, value, variance in (
+            ([1.0, 0.0, -s[0]], force[0] / push, by_force),
+            ([0.0, 1.0, -s[1]], force[1] / push, by_force),
+            ([s[0], s[1], 0.0], -velocity[2] / speed, by_motion),
+        ):
+            h = np.array(h)
+            known, off = h @ self.P @ h, value - h @ self.x
+            far = max(abs(off) / (3.0 * np.sqrt(known + variance)), 1.0)
+            gain = self.P @ h / (known + far**2 * variance)
+            self.x = self.x + gain * off
+            self.P = self.P - np.outer(gain, h @ self.P)
+        self.x[2] = np.clip(self.x[2], 0.0, 1.0)
+
+    @property
+    def normal(self):
+        made = np.array([self.x[0], self.x[1], 1.0])
+        return made / np.linalg.norm(made)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10_000), st.sampled_from([0.05, 3.0]))
+def test_it_is_the_textbooks_filter_of_the_three_equations(seed, noise):
+    rng = np.random.default_rng(seed)
+    friction = rng.uniform(0.0, 0.9)
+    estimator, oracle = NormalEstimator(PERIOD, friction), Textbook(friction)
+    for _ in range(25):
+        force = rng.standard_normal(3) * noise + [0.5, -0.3, 5.0]
+        velocity = rng.standard_normal(3) * [9.0, 9.0, 1.0]
+        if force[2] <= 0.0 or np.hypot(*velocity[:2]) < 2.0:
+            assert not estimator.feel(force, velocity, UP)
+            continue
+        assert estimator.feel(force, velocity, UP)
+        oracle.feel(force, velocity)
+        np.testing.assert_allclose(estimator.normal, oracle.normal, atol=1e-9)
+        assert estimator.friction == pytest.approx(oracle.x[2], abs=1e-9)
+        assert estimator.angle == pytest.approx(np.arccos(min(oracle.normal[2], 1.0)), abs=1e-6)
+    np.testing.assert_allclose(
+        np.array(estimator._P), oracle.P[np.triu_indices(3)], rtol=1e-9, atol=1e-15
+    )
+
+
+def test_nothing_is_known_of_friction_but_its_usual_size():
+    assert NormalEstimator(PERIOD).friction == 0.2
+    plain, told = NormalEstimator(PERIOD), NormalEstimator(PERIOD, 0.2)
+    for one in (plain, told):
+        one.feel(np.array([0.0, 0.0, 5.0]), np.array([20.0, 0.0, 0.0]), UP)
+    np.testing.assert_array_equal(plain.normal, told.normal)
+
+
+def test_two_millimetres_in_a_second_tell_something_and_less_does_not():
+    estimator = NormalEstimator(PERIOD)
+    push = np.array([0.0, 0.0, 5.0])
+    assert not estimator.feel(push, np.array([1.96875, 0.0, 0.0]), UP)
+    assert estimator.feel(push, np.array([0.0, 2.0, 0.0]), UP)
+    assert not estimator.feel(0.0 * push, np.array([0.0, 2.0, 0.0]), UP)
+    assert estimator.heard == 1
+
+
+def test_a_lean_towards_nowhere_is_the_planned_normal_at_the_other_place():
+    planned = np.array([0.6, 0.0, 0.8])
+    np.testing.assert_array_equal(carried(UP, UP, planned), planned)
+    # One that leans along the way keeps its angle, and so does one that leans across it.
+    for axis in (np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
+        made = carried(exp(0.2 * axis) @ UP, UP, planned)
+        assert angle(made, planned) == pytest.approx(np.degrees(0.2), abs=1e-9)
+
+
+def test_a_normal_turns_by_the_whole_step_towards_the_nearest_one_within_the_bound():
+    wanted = exp(np.array([0.5, 0.0, 0.0])) @ UP
+    made = turned(UP, wanted, UP, 0.3, 0.1)
+    np.testing.assert_allclose(made, exp(np.array([0.1, 0.0, 0.0])) @ UP, atol=1e-12)
+    made = turned(UP, wanted, UP, 0.3, 0.4)
+    np.testing.assert_allclose(made, exp(np.array([0.3, 0.0, 0.0])) @ UP, atol=1e-12)
+    np.testing.assert_allclose(turned(UP, wanted, UP, 0.6, 0.6), wanted, atol=1e-12)
+    np.testing.assert_array_equal(turned(UP, UP, UP, 0.3, 0.1), UP)

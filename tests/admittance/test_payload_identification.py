@@ -285,3 +285,123 @@ def test_residuals_are_told_as_lengths_of_forces_and_torques_of_the_poses_used()
     found = Identification(TRUTH, TRUTH, residual, np.ones(2), used)
     assert found.rms == pytest.approx([np.sqrt(150 / 3), np.sqrt(75 / 3)])
     assert found.largest.tolist() == [10.0, 7.0]
+
+
+def stacked(R, age):
+    """``[Rᵀ I tau I]`` of all poses, by the note: tau is age from its mean in deviations."""
+    tau = (age - age.mean()) / age.std()
+    return np.vstack(
+        [np.hstack([Ri.T, np.eye(3), x * np.eye(3)]) for Ri, x in zip(R, tau, strict=True)]
+    )
+
+
+def test_a_drift_is_looked_for_where_the_poses_tell_it_from_the_weight_and_else_not():
+    """Up to the limit of the condition, which the order of the poses decides."""
+    R = exp(np.random.default_rng(3).uniform(0.2, 1.4, (9, 3)))[[2, 0, 1, 3, 4, 5, 8, 6, 7]]
+    t = np.array([0.0, 4.0, 9.0, 11.0, 20.0, 22.0, 31.0, 33.0, 40.0])
+    number = np.linalg.cond(stacked(R, t - 40.0))
+    other = np.linalg.cond(stacked(np.swapaxes(R, 1, 2), t - 40.0))
+    assert abs(other / number - 1.0) > 0.01
+    assert condition(R) < 0.99 * number
+    readings = sensed(R) + np.outer(t - 40.0, [2e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    told = identify(R, readings, t, limit=1.001 * number)
+    assert told.condition[0] == pytest.approx(number)
+    np.testing.assert_allclose(told.drift, [2e-3, 0, 0, 0, 0, 0], atol=1e-9)
+    assert identify(R, readings, t, limit=0.999 * number).drift is None
+
+
+def test_poses_that_are_read_in_half_a_second_show_their_drift_too():
+    t = np.linspace(0.0, 0.5, 12)
+    drift = np.array([0.2, -0.1, 0.3, 0.01, 0.0, -0.02])
+    found = identify(tilted(), sensed(tilted()) + np.outer(t - 0.5, drift), t)
+    np.testing.assert_allclose(found.drift, drift, atol=1e-8)
+    np.testing.assert_allclose(found.payload.zero, TRUTH.zero, atol=1e-8)
+    assert identify(tilted(), sensed(tilted()), np.full(12, 3.0)).drift is None
+
+
+@pytest.mark.parametrize(("n", "looked"), [(5, False), (6, True)])
+def test_a_drift_is_looked_for_from_six_poses_on(n, looked):
+    R = tilted(n)
+    found = identify(R, sensed(R), np.arange(float(n)))
+    assert (found.drift is not None) is looked
+
+
+def test_standard_errors_are_those_of_least_squares_with_a_variance_for_each_axis():
+    rng = np.random.default_rng(5)
+    R, readings = tilted(9), noisy(tilted(9), 5)
+    del rng
+    found = identify(R, readings)
+    A = np.vstack([np.hstack([Ri.T, np.eye(3)]) for Ri in R])
+    left = readings[:, :3].ravel() - A @ np.linalg.lstsq(A, readings[:, :3].ravel())[0]
+    # Two unknowns to each axis.
+    variance = (left.reshape(-1, 3) ** 2).sum(axis=0) / (9 - 2)
+    inverse = np.linalg.pinv(A)
+    covariance = inverse @ np.diag(np.tile(variance, 9)) @ inverse.T
+    np.testing.assert_allclose(found.error.zero[:3], np.sqrt(np.diag(covariance)[3:]))
+    along = wrench.gravity(1.0, found.payload.inclination)
+    assert found.error.weight == pytest.approx(np.sqrt(along @ covariance[:3, :3] @ along))
+    # Its two angles turn the load across itself: by numbers of our own.
+    u, v = found.payload.inclination
+    step = 1e-6
+    for axis, turned in enumerate(((u + step, v), (u, v + step))):
+        by = (wrench.gravity(1.0, np.array(turned)) - along) / step
+        across = by / np.linalg.norm(by)
+        wanted = np.sqrt(across @ covariance[:3, :3] @ across) / np.linalg.norm(by)
+        assert found.error.inclination[axis] * found.payload.weight == pytest.approx(
+            wanted, rel=1e-4
+        )
+
+
+def test_the_axis_that_all_poses_turn_about_is_named_to_two_digits():
+    axis = np.array([-0.2588, 0.9659, 0.0])
+    for sign in (1.0, -1.0):
+        R = exp(np.linspace(-0.6, 1.0, 8)[:, None] * sign * axis / np.linalg.norm(axis))
+        with pytest.raises(RefusedError, match=r"\(-0\.26, 0\.97, 0\.00\) of the base"):
+            check_orientations(R)
+    hardly = exp(0.03 * np.random.default_rng(0).standard_normal((8, 3)))
+    with pytest.raises(RefusedError) as refused:
+        check_orientations(hardly)
+    assert "axis" not in str(refused.value)
+
+
+def test_a_condition_number_at_the_limit_is_allowed():
+    R = tilted()
+    check_orientations(R, condition(R))
+    with pytest.raises(RefusedError, match="condition number"):
+        check_orientations(R, np.nextafter(condition(R), 0.0))
+    # By its own definition: that of the stacked system.
+    system = np.vstack([np.hstack([Ri.T, np.eye(3)]) for Ri in R])
+    assert condition(R) == pytest.approx(np.linalg.cond(system))
+
+
+def test_orientations_within_a_fiftieth_of_a_radian_are_one():
+    axes = np.eye(3)
+    three = exp(np.vstack([np.zeros(3), 0.8 * axes[0], 0.8 * axes[1]]))
+    check_orientations(three, 1e6)
+    for step, enough in ((0.0199, False), (0.0201, True)):
+        two = exp(np.vstack([np.zeros(3), 0.8 * axes[0], (0.8 + step) * axes[0]]))
+        with pytest.raises(RefusedError, match="condition" if enough else "2 different"):
+            check_orientations(two)
+
+
+@pytest.mark.parametrize(
+    ("part", "size", "goes"),
+    [(1, 0.099, False), (1, 0.101, True), (4, 0.0099, False), (4, 0.0101, True)],
+)
+def test_a_pose_goes_where_the_others_miss_it_by_a_tenth_of_a_newton(part, size, goes):
+    """Torques count as forces at a tenth of a metre."""
+    readings = sensed(tilted())
+    readings[4, part] += size
+    assert identify(tilted(), readings).used[4] == (not goes)
+
+
+def test_no_more_than_a_quarter_of_the_poses_goes_and_four_are_all_needed():
+    readings = sensed(tilted())
+    readings[[1, 4, 6, 9], [0, 1, 2, 0]] += [0.3, -1.0, 4.0, 12.0]
+    assert np.count_nonzero(~identify(tilted(), readings).used) == 3
+    few = sensed(tilted(4))
+    few[2, 0] += 2.0
+    assert identify(tilted(4), few).used.all()
+    five = sensed(tilted(5))
+    five[2, 0] += 2.0
+    assert not identify(tilted(5), five).used[2]

@@ -144,3 +144,99 @@ def test_under_a_force_coupling_only_what_lies_across_the_normal_counts():
     pressed.check_rest(at, drawn.at(drawn.last))
     with pytest.raises(InstrumentError, match=r"3\.00 mm"):
         free.check_rest(at, drawn.at(drawn.last))
+
+
+def at(position, turn=0.0, t=0.0):
+    return RobotState(t, position, exp_one(np.array([0.0, 0.0, turn])) @ PEN_DOWN, "ready")
+
+
+def test_an_arm_at_the_end_of_a_stroke_has_not_arrived_before_that_was_sent():
+    """A closed stroke ends where it begins."""
+    drawn = plan(made(circle(4.0)))
+    monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
+    for index in range(drawn.last):
+        monitor.see(at(drawn.position[index]), index)
+        assert (monitor.near, monitor.looked, monitor.arrived) == (False, False, False)
+    monitor.see(at(drawn.position[-1]), drawn.last)
+    assert (monitor.near, monitor.looked, monitor.arrived) == (True, True, True)
+    # Once it was seen there, that counts.
+    monitor.see(at(drawn.position[-1] + 3.0), drawn.last + 1)
+    assert monitor.arrived
+
+
+@pytest.mark.parametrize(("moved", "started"), [(1.99, False), (2.0, True)])
+def test_half_as_far_as_the_stroke_leads_is_a_beginning(moved, started):
+    drawn = plan(made(line(4.0)))
+    drawn.position[drawn.last] = START + [4.0, 0.0, 0.0]
+    monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
+    monitor.see(at(START), 0)
+    monitor.see(at(START + [0.0, moved, 0.0]), 50)
+    assert monitor.started is started
+
+
+@pytest.mark.parametrize(("turn", "started"), [(0.0449, False), (0.0451, True)])
+def test_half_as_far_as_it_turns_is_a_beginning_too(turn, started):
+    monitor = ArrivalMonitor(plan(made(line(0.0), 0.09 * U)), 1.0, 0.0175)
+    monitor.see(at(START), 0)
+    monitor.see(at(START, turn), 50)
+    assert monitor.started is started
+
+
+def test_a_stroke_that_hardly_leads_anywhere_needs_no_beginning():
+    for way, turn, needs in (
+        (line(0.099), None, False),
+        (line(0.101), None, True),
+        (line(0.0), 0.0099 * U, False),
+        (line(0.0), 0.0101 * U, True),
+    ):
+        assert ArrivalMonitor(plan(made(way, turn)), 1.0, 0.0175).started is not needs
+
+
+def test_what_lies_before_the_stroke_is_no_beginning_of_it():
+    drawn = plan(made(line(4.0)), start=(START - [9.0, 0.0, 0.0], PEN_DOWN))
+    monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
+    monitor.see(at(drawn.position[0]), 0)
+    monitor.see(at(START), drawn.lead)
+    monitor.see(at(START + [1.9, 0.0, 0.0]), drawn.lead + 1)
+    assert not monitor.started
+
+
+@pytest.mark.parametrize(
+    ("off", "turn", "near"),
+    [(1.0, 0.0, True), (1.0001, 0.0, False), (0.0, 0.0174, True), (0.0, 0.0176, False)],
+)
+def test_it_has_arrived_within_its_tolerances_and_rests_there(off, turn, near):
+    drawn = plan(made(line(4.0)))
+    monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
+    end = drawn.at(drawn.last)
+    state = at(end[0] + [0.0, off, 0.0], turn)
+    monitor.see(state, drawn.last)
+    assert monitor.near is near
+    if near:
+        monitor.check_rest(state, end)
+        return
+    with pytest.raises(InstrumentError, match="rests elsewhere than at its last set-point"):
+        monitor.check_rest(state, end)
+
+
+def test_a_goal_that_comes_nearer_asks_half_of_what_is_left():
+    monitor = ArrivalMonitor(plan(made(line(8.0))), 1.0, 0.0175)
+    monitor.see(at(START), 0)
+    monitor.follow(plan(made(line(2.0))))
+    monitor.see(at(START + [1.01, 0.0, 0.0]), 40)
+    assert monitor.started
+    fresh = ArrivalMonitor(plan(made(line(8.0))), 1.0, 0.0175)
+    fresh.follow(plan(made(line(0.05))))
+    assert fresh.started
+
+
+def test_who_has_seen_nothing_says_that_it_has_not_moved():
+    monitor = ArrivalMonitor(plan(made(line(0.0))), 1.0, 0.0175)
+    assert monitor.started
+    with pytest.raises(InstrumentError, match="has not moved as they ask"):
+        monitor.refuse()
+    monitor.see(at(START + [0.0, 0.0, 2.5]), 100)
+    with pytest.raises(
+        InstrumentError, match=r"did not come to the end of stroke 0: it is 2\.50 mm"
+    ):
+        monitor.refuse()

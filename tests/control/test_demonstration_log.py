@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dmpcli.admittance.model import DragState
+from dmpcli.control import demonstration_log
 from dmpcli.control.demonstration_log import DemonstrationLog
 from dmpcli.instruments.protocols import RobotState, Sample
 from dmpcli.spatial.rotations import exp
@@ -80,3 +81,19 @@ def test_it_is_still_once_all_of_so_long_was_within_so_far():
     assert all(found[first:])
     assert not along(np.zeros(10)).still(0.4, 1.0)
     assert along(np.zeros(22)).still(0.4, 0.0)
+
+
+def test_the_limits_of_rest_are_met_exactly():
+    # Periods of an eighth of a second, so that sums are exact.
+    for duration, distance, still in ((0.5, 1.0, True), (0.5, 0.96875, False), (0.625, 2.0, False)):
+        log = DemonstrationLog(False)
+        for i, place in enumerate([0.0, 0.0, 0.0, 0.0, 1.0]):
+            state = RobotState(0.0, np.array([place, 0.0, 0.0]), PEN_DOWN, "ready")
+            log.add(0.125 * i, state, None, np.zeros(6), Sample(0.0, i, np.zeros(6), True, 0))
+        assert log.still(duration, distance) is still
+        assert (log.moved(1.0), log.moved(0.96875)) == (False, True)
+    assert DemonstrationLog().duration == 0.0
+
+
+def test_of_a_recording_that_only_a_journal_is_left_of_that_is_said():
+    assert demonstration_log.recovered() == {"ended": "recovered after a crash"}

@@ -578,3 +578,90 @@ def test_an_arm_that_runs_away_is_held_in_a_room_about_its_start(workspace):
     else:
         assert "leaves the workspace" in ending.reason
         assert away <= (500.0 if workspace is None else 50.0)
+
+
+def test_where_the_arm_tells_nothing_new_there_is_no_new_row():
+    """The same report again, or one that differs by the rounding of a clock's sums."""
+    recorder, _, servo = bench(longest=1.0)
+    read, held = servo.state, []
+
+    def state():
+        told = read()
+        # Every third report comes again, a third of a nanosecond younger.
+        if len(held) % 3 == 2:
+            told = replace(told, t=held[-1].t + 3e-10)
+        held.append(told)
+        return told
+
+    servo.state = state
+    assert recorder.run().failure is None
+    t = recorder.log.columns()["t"]
+    assert np.diff(t).min() > 1e-3
+    assert 20 < len(t) < 40
+
+
+@pytest.mark.parametrize("early", [0.009, 0.011])
+def test_a_recording_begins_half_a_period_before_its_time_and_not_earlier(early):
+    """A report that is so much older than its cycle: after the lead-in it is the first row."""
+    recorder, _, servo = bench(longest=1.0)
+    recorder._lead_in = 0.2
+    read = servo.state
+    servo.state = lambda: replace(read(), t=servo.clock.now() - early)
+    assert recorder.run().reason == "duration"
+    t = recorder.log.columns()["t"]
+    assert t[0] == pytest.approx(-early if early < 0.01 else 0.02 - early)
+    assert t[-1] <= 1.0 + 0.01
+
+
+def test_the_newest_reading_stands_beside_what_was_made_of_it():
+    recorder, sensor, _ = bench(longest=1.0, low_pass=49.0, dead_band_force=0.0)
+    sensor.wrench = lambda t: np.array([np.sin(3.0 * t), 0.0, 0.0, 0.0, 0.0, 0.0])
+    recorder.run()
+    columns = recorder.log.columns()
+    newest = columns["t"] + BEGAN
+    np.testing.assert_allclose(columns["fx_raw"], np.sin(3.0 * newest), atol=1e-9)
+    # The first cycle has felt nothing yet; from then on the low-pass lags by half a millisecond.
+    lag = np.abs(columns["fx"] - columns["fx_raw"])[1:]
+    assert 1e-4 < lag.max() < 2e-3
+    np.testing.assert_array_equal(columns["lost"], 0)
+
+
+def test_it_ends_for_the_first_reason_that_there_is():
+    recorder, _, _ = bench(longest=2.0)
+    assert recorder._reason_to_end(1.9899) == ""
+    assert recorder._reason_to_end(1.9901) == "duration"
+    recorder._asked_to_end = lambda: True
+    assert recorder._reason_to_end(9.0) == "asked"
+    recorder._asked_to_end = lambda: False
+    recorder._interruption.receive(2)
+    assert recorder._reason_to_end(0.0) == "asked"
+    recorder._hindrance = lambda: InstrumentError("disk full")
+    assert recorder._reason_to_end(0.0) == "disk full"
+
+
+def test_a_chatter_makes_the_drag_heavier_along_the_tool_and_is_told():
+    """Pushed to and fro by 6 N at 2 Hz along the tool."""
+    recorder, sensor, _ = bench(longest=3.0)
+    said = []
+    recorder._noticed = said.append
+    sensor.wrench = lambda t: np.array([0.0, 0.0, 6.0 * np.sin(12.6 * t), 0.0, 0.0, 0.0])
+    before = recorder._law
+    recorder.run()
+    alarms = recorder.chatter.alarms
+    assert len(said) == len(alarms) >= 1
+    grown = 1.6 ** len(alarms)
+    np.testing.assert_allclose(recorder._law.damping / before.damping, [1, 1, grown, 1, 1, 1])
+    # Across the tool nothing chatters.
+    recorder, sensor, _ = bench(longest=3.0)
+    sensor.wrench = lambda t: np.array([6.0 * np.sin(12.6 * t), 0.0, 0.0, 0.0, 0.0, 0.0])
+    recorder.run()
+    assert recorder.chatter.alarms == []
+
+
+def test_where_others_may_move_the_arm_it_must_stand_still_when_it_is_taken():
+    for shared, drag, waits in ((True, "admittance", True), (False, "admittance", False)):
+        recorder, _, servo = bench(longest=0.2, drag=drag)
+        recorder._shared = shared
+        begun = servo.clock.now()
+        recorder.run()
+        assert (servo.sent[0][0] - begun > 0.25) is waits

@@ -11,8 +11,11 @@ from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.kinematics import models
+from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.preflight import Check
+from dmpcli.planning.transfers import TransferOptions
 from dmpcli.settings.execute import ExecuteSettings
 from tests.control.streaming_fakes import START, FakeClock, FakeServo, plan, stroke
 
@@ -124,3 +127,88 @@ def test_the_facts_hold_each_strokes_own_ends_once():
 def test_a_stroke_that_is_asked_to_wait_forever_names_the_option():
     with pytest.raises(InputError, match="raise --speed"):
         plan(stroke(), speed=1e-3, period=0.002)
+
+
+def test_what_the_first_stroke_says_of_all_is_told_once():
+    one, two = batch("a", "b").found
+    two = dataclasses.replace(two, facts={"tau": 9.0, "goal": [1, 2, 3], "normal": None})
+    facts = execution_plan.facts_of(StrokeSelection((one, two), {"x": "too long"}, (), True))
+    assert facts == {
+        "trajectory": {"tau": 2.0},
+        "strokes": [{"id": "a", "start": [0, 0, 0]}, {"id": "b", "goal": [1, 2, 3]}],
+        "failed": ["x"],
+    }
+
+
+def test_what_was_passed_over_is_named():
+    assert execution_plan.passed_over({"a": "too long"}) == (
+        "pair a has no trajectory and is not drawn: too long"
+    )
+    assert execution_plan.passed_over({"a": "too long", "b": "off"}) == (
+        "2 pairs have no trajectory and are not drawn: a, b; the first: too long"
+    )
+
+
+def test_when_all_is_drawn_it_is_said():
+    assert execution_plan.rest_of(batch("a"), ["a"]) == "the stroke is drawn"
+    assert execution_plan.rest_of(batch("a", "b"), ["a", "b"]) == "all 2 strokes are drawn"
+    nine = [str(i) for i in range(9)]
+    assert "more" not in execution_plan.rest_of(batch(*nine), nine[:1])
+    assert "and 1 more" in execution_plan.rest_of(batch(*nine), [])
+
+
+def test_ways_go_by_each_setting_as_it_is_set():
+    settings = ExecuteSettings(
+        clearance=17.0,
+        transfer_speed=90.0,
+        retract_speed=40.0,
+        lead_speed=15.0,
+        coupling_clamp=9.0,
+        period=0.05,
+    )
+    made = execution_plan.ways(settings, 0.2, presses=True)
+    assert made == TransferOptions(17.0, 90.0, 40.0, 15.0, 4, 9.0)
+    assert execution_plan.ways(settings, 0.21, presses=False) == (
+        TransferOptions(17.0, 90.0, 40.0, 15.0, 5, 0.0)
+    )
+
+
+def test_where_the_arm_stands_is_judged_for_the_first_stroke_alone():
+    away = START + [0.0, 3.0, 0.0]
+    found, _ = prepared([stroke(), stroke()], away)
+    assert [one.failure is None for one in found] == [False, True]
+    assert "over the work with --approach" in found[0].failure.remedy
+    assert sum("from the arm" in check.quantity for check in found[1].checks) == 0
+    led, _ = prepared([stroke(), stroke()], away, approach=20.0)
+    assert [one.failure for one in led] == [None, None]
+    [one], _ = prepared([stroke()], away)
+    assert "straight there with --approach" in one.failure.remedy
+
+
+def test_an_arm_that_is_not_ready_is_refused_before_anything_is_planned():
+    clock = FakeClock()
+    servo = FakeServo(clock)
+    servo.mode = "fault"
+    selected = StrokeSelection((FoundStroke(stroke(), {}),), {}, (), True)
+    with pytest.raises(RefusedError, match="robot: fault"):
+        execution_plan.prepare(
+            selected, ExecuteSettings(), ReadyArm(servo, servo.info, clock), False, lambda _: None
+        )
+
+
+def test_the_joints_of_a_stroke_go_on_from_those_of_the_one_before():
+    reach = Reach(models.model("ec66"))
+    clock = FakeClock()
+    servo = FakeServo(clock)
+    many = tuple(FoundStroke(stroke(4.0), {}) for _ in range(2))
+    judged = execution_plan.prepare(
+        StrokeSelection(many, {}, (), False), ExecuteSettings(), ReadyArm(servo, servo.info, clock),
+        False, lambda _: None, reach,
+    )  # fmt: skip
+    whole = np.concatenate([one.plan.position for one in judged])
+    turned = np.concatenate([one.plan.rotation for one in judged])
+    q = reach.follow(whole[None], turned[None], 0.02)
+    for one in judged:
+        assert [c.passed for c in one.checks if "joint" in c.quantity] == [True, True]
+    speeds = [c.value for one in judged for c in one.checks if "speed of joint" in c.quantity]
+    assert max(speeds) == pytest.approx(np.degrees(q.speed.value[0]), rel=1e-6)

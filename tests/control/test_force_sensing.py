@@ -160,3 +160,66 @@ def test_only_young_samples_are_recent_but_all_are_checked():
     assert heard.recent(0.15) == []
     with pytest.raises(InstrumentError, match="not a number"):
         sensing([sample(0.0, np.nan), sample(5.0)]).recent(5.0)
+
+
+@pytest.mark.parametrize(
+    ("force", "torque", "fits"),
+    [
+        (2.0, 0.0, True),
+        (2.0 + 2.0**-20, 0.0, False),
+        (0.0, 0.2, True),
+        (0.0, 0.2 + 2.0**-20, False),
+    ],
+)
+def test_a_reading_at_the_tolerance_itself_is_explained(force, torque, fits):
+    tool = replace(PEN, weight=0.0, centre=np.zeros(3), zero=np.zeros(6))
+    felt = sensing([Sample(0.0, 1, np.array([0.0, 0.0, force, 0.0, torque, 0.0]), True, 0)])
+    if fits:
+        assert felt.zeroed(tool, LEVEL, 0.5, 2.0) is tool
+        return
+    with pytest.raises(RefusedError, match=r"over 2 N and 0\.2 N·m"):
+        felt.zeroed(tool, LEVEL, 0.5, 2.0)
+
+
+@pytest.mark.parametrize(("rate", "silence"), [(100.0, 0.1), (10.0, 0.25)])
+def test_silence_is_a_tenth_of_a_second_or_a_lost_sample_of_a_slow_sensor(rate, silence):
+    felt = sensing([sample(1.0)], rate=rate)
+    felt.hear(1.0)
+    felt.hear(1.0 + silence - 1e-9)
+    with pytest.raises(InstrumentError, match="silent"):
+        felt.hear(1.0 + silence + 1e-6)
+
+
+def test_before_the_first_sample_silence_counts_from_the_beginning():
+    felt = sensing()
+    assert (felt.newest.t, felt.newest.seq, felt.newest.lost) == (0.0, 0, 0)
+    np.testing.assert_array_equal(felt.newest.wrench, 0.0)
+    assert felt.newest.healthy
+    assert felt.hear(0.1) == []
+
+
+def test_a_sensor_that_knows_why_it_is_not_healthy_is_quoted():
+    bad = Sample(0.0, 9, np.zeros(6), healthy=False, lost=0, reason="its gauge is broken")
+    with pytest.raises(InstrumentError, match="sample 9: its gauge is broken, stopped"):
+        sensing([bad]).hear(0.0)
+
+
+def test_how_long_is_waited_for_a_zero_a_check_and_a_sign_of_life():
+    for tool, tolerance, waited in ((UNKNOWN, None, 0.5), (PEN, None, 0.1), (PEN, 1e3, 0.1)):
+        felt = sensing([sample(0.1, 1.0)])
+        felt.zeroed(tool, LEVEL, 0.5, tolerance)
+        assert felt._clock.now() == pytest.approx(waited)
+    # Without a tolerance the tool may be another sensor's.
+    assert sensing([sample(0.1)]).zeroed(replace(PEN, sensor="other"), LEVEL, 0.5)
+
+
+def test_looking_back_takes_what_is_whole_and_fails_for_nothing():
+    good = sample(0.0, 1.0)
+    bad = [sample(0.01, healthy=False), sample(0.02, np.nan)]
+    assert sensing([good, *bad]).rest() == [good]
+
+    class Broken:
+        def poll(self):
+            raise InstrumentError("the cable is out")
+
+    assert Sensing(Broken(), INFO, 100.0, 0.02, SimulatedClock()).rest() == []

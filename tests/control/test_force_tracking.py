@@ -6,15 +6,20 @@ import numpy as np
 import pytest
 
 from dmpcli.admittance.force_coupling import fast_filter
+from dmpcli.admittance.force_law import ForceGains
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.met_wall import MetWall
+from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
+from dmpcli.planning.plan import joined, straight
+from dmpcli.planning.plan import sample as sample_stroke
 from dmpcli.spatial.rotations import from_euler
 from tests.control.fake_sensors import BatchSensor
-from tests.control.streaming_fakes import PEN_DOWN, START, plan, stroke
+from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, stroke
 
 PERIOD = 0.02
 UP = (0.0, 0.0, 1.0)
@@ -205,3 +210,190 @@ def test_work_per_cycle_makes_no_arrays_but_a_few():
     used = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert used < 20_000
+
+
+def test_at_the_last_set_point_the_last_force_is_wanted_and_beyond_it_too():
+    force = 2.0 + 0.01 * np.arange(501)
+    press = pressing(source=wavelike(force))
+    assert [press.wanted(i) for i in (0.0, 499.0, 500.0, 501.0)] == [2.0, 6.99, 7.0, 7.0]
+    assert press.wanted(499.9) == 6.99
+
+
+def test_before_and_after_the_stroke_no_force_is_wanted():
+    made = plan(stroke(normal=UP), start=(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
+    press = ForceTracker(
+        ContactSupervisor(ContactPolicy(3.0), PERIOD), fast_filter(5.0, PERIOD), made
+    )
+    assert [press.wanted(i) for i in (0, made.lead - 1, made.lead, made.last)] == [0, 0, 3.0, 3.0]
+    lifted = dataclasses.replace(
+        made, force=np.where(np.arange(len(made)) < made.lead + 9, 1.0, 0.0)
+    )
+    own = ForceTracker(
+        ContactSupervisor(ContactPolicy(3.0), PERIOD), fast_filter(5.0, PERIOD), lifted
+    )
+    assert [own.wanted(i) for i in (made.lead - 1, made.lead, made.lead + 9)] == [0.0, 1.0, 0.0]
+
+
+def lifted_on(legs, lead=100, reach=6.0, free=10.0):
+    """Shares of the lift before a stroke, by the legs of the way to it."""
+    made = plan(stroke(normal=UP))
+    rows = np.zeros(lead, dtype=int)
+    whole = dataclasses.replace(
+        made, t=np.concatenate([rows, made.t]), position=made.position[np.r_[rows, 0:501]],
+        rotation=made.rotation[np.r_[rows, 0:501]], normal=made.normal[np.r_[rows, 0:501]],
+        lead=lead, last=lead + 500, legs=(*legs, ("stroke", lead)),
+    )  # fmt: skip
+    policy = ContactPolicy(3.0, reach=reach, free=free)
+    return ForceTracker(ContactSupervisor(policy, PERIOD), fast_filter(5.0, PERIOD), whole)._lifts
+
+
+def test_the_lift_grows_along_the_last_way_to_the_stroke_by_minimum_jerk():
+    found = lifted_on([("transfer", 0), ("approach", 40)])
+    s = np.arange(1, 61) / 60.0
+    np.testing.assert_array_equal(found[:40], 0.0)
+    np.testing.assert_allclose(found[40:], 10 * s**3 - 15 * s**4 + 6 * s**5)
+    assert found[-1] == 1.0
+    assert found.shape == (100,)
+    # The last approach counts, and a way without one lifts nothing.
+    np.testing.assert_array_equal(
+        lifted_on([("approach", 0), ("transfer", 9), ("approach", 40)]), found
+    )
+    np.testing.assert_array_equal(lifted_on([("transfer", 0)]), 0.0)
+
+
+@pytest.mark.parametrize(("reach", "lifts"), [(12.79, True), (12.81, False)])
+def test_a_way_that_would_lift_faster_than_twice_the_free_speed_stays_as_it_is(reach, lifts):
+    # 1.875 times the reach in 60 periods of 20 ms, at the most 20 mm/s.
+    assert bool(lifted_on([("transfer", 0), ("approach", 40)], reach=reach).any()) is lifts
+
+
+def test_the_zero_of_the_force_turns_with_the_tool_up_to_the_last_set_point():
+    made = plan(stroke(normal=UP, turn=0.5))
+    last = from_euler(np.array([np.pi - 0.3, 0.2, 1.0]))
+    made.rotation[-1] = last
+    press = ForceTracker(
+        ContactSupervisor(ContactPolicy(3.0), PERIOD), fast_filter(5.0, PERIOD), made
+    )
+    tool = np.array([0.4, -0.3, 0.5])  # what it reads beside its zero, tool axes
+    while press.supervisor.state == "free":
+        press.displace(0.0, np.append(made.rotation[0] @ tool, np.zeros(3)), press.supervisor.law.e)
+    felt = []
+    step = press.supervisor.step
+    press.supervisor.step = lambda t, force, across, *more: (
+        felt.append((force, across)) or step(t, force, across, *more)
+    )
+    for index, R in ((0.0, made.rotation[0]), (250.0, made.rotation[250]), (500.0, last)):
+        press.displace(index, np.append(R @ tool + [0.0, 0.0, 2.0], np.zeros(3)), 9.0)
+    np.testing.assert_allclose(felt, [[2.0, 0.0]] * 3, atol=1e-9)
+
+
+def test_force_is_that_along_the_normal_and_the_rest_is_across_it():
+    press = pressing((0.6, 0.0, 0.8))
+    felt = []
+    press.supervisor.step = lambda *said: felt.append(said)
+    press.displace(100.0, np.array([3.0, 4.0, 5.0, 9.0, 9.0, 9.0]), 2.0)
+    [(t, force, across, wanted, friction)] = felt
+    assert (t, force, wanted) == (2.0, pytest.approx(5.8), 3.0)
+    assert across == pytest.approx(np.sqrt(50.0 - 5.8**2))
+    assert friction == press.sense.friction
+
+
+def test_only_what_is_drawn_and_wanted_is_counted():
+    force = np.where(np.arange(501) < 300, 4.0, 0.0)
+    press = pressing(source=wavelike(force), contact=0.5)
+    press.supervisor.step = lambda *_: None
+    for index, pushed in ((0.0, 4.0), (1.0, 4.5), (2.0, 0.5), (3.0, 0.51), (301.0, 9.0)):
+        press.displace(index, push(UP, pushed), 0.0)
+    assert press.tally.felt == [4.5, 0.5, 0.51]
+    assert press.tally.share("0") == pytest.approx(2.0 / 3.0)
+    press.supervisor.doubted, press.supervisor.saturated = True, True
+    press.displace(4.0, push(UP, 4.0), 0.0)
+    assert press.tally.share("0") == 0.5
+    assert press.tally.facts(0.5)["saturated"] == 0.25
+    # A set-point of less than twice the threshold: half of it counts.
+    soft = pressing(source=wavelike(np.full(501, 0.6)), contact=0.5)
+    soft.supervisor.step = lambda *_: None
+    for index, pushed in ((1.0, 0.3), (2.0, 0.31)):
+        soft.displace(index, push(UP, pushed), 0.0)
+    assert soft.tally.share("0") == 0.5
+
+
+@pytest.mark.parametrize(("force", "fails"), [(4.99, False), (5.01, True)])
+def test_on_the_way_down_more_than_the_set_point_and_a_zero_is_met_too_early(force, fails):
+    made = plan(stroke(normal=UP), start=(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
+    supervisor = ContactSupervisor(ContactPolicy(3.0, zero_limit=2.0), PERIOD)
+    press = ForceTracker(supervisor, fast_filter(5.0, PERIOD), made)
+    press.come(5.0, push(UP, force), 1.5)
+    assert bool(press.failure) is fails
+    assert supervisor.urgent is fails
+    press.come(6.0, None, 1.5)
+
+
+def test_off_the_work_what_is_left_of_it_goes_with_the_way():
+    source = sample_stroke(stroke(normal=UP), PERIOD, 1.0, PEN_DOWN)
+    end = (source.position[-1] + [0.0, 0.0, 20.0], source.rotation[-1])
+    off = straight("retract", source.pose(-1), end, PERIOD, WIDE, 50.0)
+    made = joined(source, [], [off], PERIOD, True)
+    press = ForceTracker(
+        ContactSupervisor(ContactPolicy(3.0), PERIOD), fast_filter(5.0, PERIOD), made
+    )
+    press._delta = np.array([-2.0, 0.0])
+    reach = made.position[-1, 2] - made.position[made.last, 2]
+    for index in (made.last + 1, made.last + 9, len(made) - 1):
+        left = press.leave(float(index), 1.0)
+        gone = (made.position[index, 2] - made.position[made.last, 2]) / reach
+        np.testing.assert_allclose(left, [0.0, 0.0, -2.0 * (1.0 - gone)], atol=1e-12)
+    assert press.supervisor.state == "retreating"
+    # Where the plan does not leave the work, the tool is lifted.
+    press.retreat(float(made.last), 2.0)
+    assert press.hold(float(made.last))[2] > -2.0
+
+
+def test_another_stroke_is_counted_by_itself_with_the_same_supervisor():
+    press = pressing(override=2.5)
+    other = press.on(dataclasses.replace(plan(stroke(normal=UP)), id="next"))
+    assert (other.supervisor, other.tally, other.sense) == (
+        press.supervisor,
+        press.tally,
+        press.sense,
+    )
+    assert other.wanted(100.0) == 3.0  # the plan states no force of its own to override
+    assert other.tally.share("next") == 1.0
+    moved = plan(stroke(duration=12.0, normal=UP))
+    other.follow(moved)
+    assert len(other._wanted) == len(moved)
+    with pytest.raises(ValueError, match="without normals"):
+        press.on(plan(stroke()))
+
+
+def test_what_was_known_of_the_gains_is_told():
+    press = pressing()
+    assert press.gains() == {}
+    press.supervisor.gains = ForceGains(0.1, 2.0, 0.3, np.inf, PERIOD)
+    assert press.gains() == {"mass": 0.1, "damping": 2.0}
+    press.supervisor.gains = ForceGains(0.1, 2.0, 0.3, 0.7, PERIOD)
+    assert press.gains() == {"mass": 0.1, "damping": 2.0, "integral_time": 0.7}
+    assert press.facts() == {"contact_events": []}
+
+
+def test_a_wall_that_was_met_stands_in_the_file():
+    arm = LateArm(0.05)
+    arm.settle()
+    arm.step(1.0)
+    supervisor = arm.press.supervisor
+    arm.press.wall = MetWall(4.0, 4.5, 10.0, 3.0, 0.1)
+    found = arm.press.facts()["contact"]
+    assert found["wall"] == {
+        "across": 4.0, "largest": 4.5, "speed": 10.0, "stiffness": 3.0, "reaction": 0.1,
+        "unavoidable": pytest.approx(3.0),
+    }  # fmt: skip
+    assert (found["stiffness"], found["delay"]) == (supervisor.stiffness, supervisor.delay)
+    assert found["landing_peak"] == supervisor.landing_peak
+    supervisor.stiffness = arm.press.wall = None
+    assert not {"wall", "stiffness"} & set(arm.press.facts()["contact"])
+
+
+def test_more_than_the_tool_may_meet_stops_whatever_is_felt_with():
+    with pytest.raises(RefusedError, match="force"):
+        touch([sample(0.0, 4.0)]).feel(state(), 0.0, 3.9)
+    assert touch([sample(0.0, 4.0)]).feel(state(), 0.0, 4.0)[2] == 4.0

@@ -13,7 +13,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.dmp.goal_step import GoalFilter
 from dmpcli.errors import InputError, RefusedError
-from dmpcli.instruments.goal_sources import ScheduledGoals
+from dmpcli.instruments.goal_sources import BACK, GoalNews, ScheduledGoals
 from dmpcli.kinematics.models import model
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
@@ -296,3 +296,172 @@ def test_a_stroke_that_is_too_long_is_refused(monkeypatch):
     monkeypatch.setattr(goal_following, "LONGEST", 100)
     with pytest.raises(InputError, match="201 set-points"):
         Run([(1.0, (1.0, 0.0, 0.0))])
+
+
+ON = "; the arm goes on to the last goal that was taken"
+
+
+class Asked:
+    """A source that says what it is told to, and remembers when it was asked."""
+
+    name = "asked"
+
+    def __init__(self, *news):
+        self.news, self.asked = list(news), []
+
+    def take(self, now, elapsed):
+        self.asked.append((now, elapsed))
+        return [self.news.pop(0)] if self.news else []
+
+
+def followed(*news, made=SHORT, told=None, **options):
+    source, said = Asked(*news), []
+    limits = options.pop("limits", WIDE)
+    known = GoalOptions(limits, tell=said.append, **options)
+    return GoalFollower(source, made, FILTER, UP, known), source, said
+
+
+def test_a_source_is_asked_with_the_time_since_the_strokes_first_set_point():
+    made = plan(stroke(duration=4.0), start=(START + [0.0, 9.0, 0.0], PEN_DOWN))
+    assert made.lead > 10
+    goals, source, _ = followed(made=made)
+    for now, index in ((0.0, 0.0), (1.0, made.lead), (7.5, made.lead + 12.5)):
+        assert goals.step(now, float(index)) is None
+    np.testing.assert_allclose(source.asked, [(0.0, -made.lead * PERIOD), (1.0, 0.0), (7.5, 0.25)])
+
+
+def test_what_is_not_believed_is_counted_each_time_and_told_once():
+    silent = GoalNews(None, "no news", "for 1 s", status=True)
+    bad = GoalNews(None, "no number", "nan")
+    goals, _, said = followed(bad, silent, bad, bad, GoalNews(None, BACK, "", status=True))
+    for k in range(6):
+        goals.step(0.1 * k, 10.0 + k)
+    facts = goals.facts()["goals"]
+    assert facts["not_taken"] == {"no number": 3}
+    assert facts["told"] == [
+        {"t": 0.0, "what": "no number", "detail": "nan"},
+        {"t": 0.1, "what": "no news", "detail": "for 1 s"},
+        {"t": 0.4, "what": BACK, "detail": ""},
+    ]
+    assert said == [
+        f"goal from asked at 0.00 s: no number: nan{ON}",
+        f"goal from asked at 0.10 s: no news: for 1 s{ON}",
+        f"goal from asked at 0.40 s: {BACK}",
+    ]
+    assert goals.said() == "no goal was taken from asked (3 × no number): drawn as planned"
+    assert facts["planned"] == facts["last"] == pytest.approx(GOAL.tolist())
+
+
+def test_a_goal_that_is_taken_is_told_with_when_and_where():
+    goals, _, said = followed(GoalNews(GOAL + [3.0, 0.0, 0.25]), GoalNews(GOAL + [3.0, 4.0, 0.0]))
+    made = goals.step(1.0, 50.0)
+    assert made is goals.course.plan
+    assert goals.step(1.02, 51.0) is not None
+    facts = goals.facts()["goals"]
+    assert [one["t"] for one in facts["taken"]] == [1.0, 1.02]
+    # The part of it off the plane is left out.
+    assert facts["taken"][0]["goal"] == pytest.approx((GOAL + [3.0, 0.0, 0.0]).tolist())
+    assert facts["last"] == pytest.approx((GOAL + [3.0, 4.0, 0.0]).tolist())
+    x, y, z = GOAL + [3.0, 4.0, 0.0]
+    assert (
+        goals.said() == f"2 goals taken from asked; the last one is ({x:.2f}, {y:.2f}, {z:.2f}) mm"
+    )
+    assert said == []
+
+
+@pytest.mark.parametrize(
+    ("way", "kind"),
+    [
+        ([0.0, 0.0, 0.5 - 1e-9], None),
+        ([5.0, 0.0, 0.5 - 1e-9], "taken"),
+        ([5.0, 0.0, -0.5001], "off the plane"),
+        ([30.0, 40.0, 0.0], "taken"),
+        ([30.0, 40.001, 0.0], "too far"),
+        ([0.9e-6, 0.0, 0.0], None),
+        ([1.1e-6, 0.0, 0.0], "taken"),
+    ],
+)
+def test_a_goal_is_taken_up_to_the_limits_of_plane_range_and_sameness(way, kind):
+    made = dataclasses.replace(WIDE, speed=1e6, acceleration=1e9, jerk=1e12)
+    goals, _, _ = followed(GoalNews(GOAL + way), range=50.0, limits=made)
+    goals.step(1.0, 50.0)
+    kinds = [one.kind for one in (*goals.taken, *goals.told)]
+    assert kinds == ([] if kind is None else [kind])
+
+
+def test_the_last_set_point_but_one_is_the_last_that_a_goal_may_drive_the_stroke_from():
+    for index, kinds in ((SHORT.last - 1, []), (SHORT.last, ["too late"])):
+        goals, _, _ = followed(GoalNews(GOAL + [1.0, 0.0, 0.0]))
+        goals.step(1.0, float(index))
+        assert [one.kind for one in goals.told] == kinds
+        assert len(goals.taken) == 1 - len(kinds)
+    # On the way to the stroke it drives from the stroke's first set-point on.
+    made = plan(stroke(duration=4.0), start=(START + [0.0, 9.0, 0.0], PEN_DOWN))
+    goals, _, _ = followed(GoalNews(made.position[-1] + [1.0, 0.0, 0.0]), made=made)
+    assert goals.step(0.0, 3.0) is not None
+    assert goals.course.start == made.lead
+
+
+def test_a_course_that_set_points_have_overtaken_is_proposed_anew(monkeypatch):
+    goals, _, _ = followed(GoalNews(GOAL + [1.0, 0.0, 0.0]))
+    judge = goal_course.judged
+
+    def slow(*given):
+        yield from ("", "")
+        yield from judge(*given)
+
+    monkeypatch.setattr(goal_course, "judged", slow)
+    for index in (50.0, 51.0, 52.0):
+        assert goals.step(1.0 + 0.02 * index, index) is None
+    assert goals.taken == []
+    monkeypatch.undo()
+    assert goals.step(2.06, 53.0) is not None
+    assert goals.course.start == 53
+
+
+def test_joints_that_are_told_before_the_start_are_where_the_judging_begins():
+    reach = Reach(model("ec66"))
+    goals, _, _ = followed(reach=reach)
+    own = goals.course.joints
+    q = own[0] + [0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * np.pi]
+    goals.begin(q)
+    np.testing.assert_allclose(goals.course.joints[0], q, atol=1e-6)
+    before = goals.course
+    goals.begin(None)
+    goals.begin(np.zeros(7))
+    assert goals.course is before
+    plain, _, _ = followed()
+    plain.begin(q)
+    assert plain.course.joints is None
+    assert (GoalOptions(WIDE).range, GoalOptions(WIDE).reach) == (200.0, None)
+
+
+def test_normals_that_differ_by_a_rounding_are_one_plane():
+    flat = stroke(normal=(0.0, 0.0, 1.0))
+    for lean, fits in ((0.99e-4, True), (1.01e-4, False)):
+        normal = flat.normal.copy()
+        normal[7] = [lean, 0.0, 1.0]
+        bent = dataclasses.replace(flat, normal=normal)
+        if fits:
+            np.testing.assert_array_equal(plane_of(bent, {}), UP)
+        else:
+            with pytest.raises(RefusedError):
+                plane_of(bent, {})
+    np.testing.assert_allclose(plane_of(stroke(), {"normal": [0.0, 3.0, 4.0]}), [0.0, 0.6, 0.8])
+
+
+def test_what_drives_a_stroke_is_what_its_file_states():
+    facts = {"k": [90.0, 90.0, 90.0, 1.0], "d": [18.0, 18.0, 18.0, 2.0], "tau": 3.0}
+    made = filter_of(facts, 2.0, 0.01)
+    assert made == GoalFilter(90.0, 18.0, 1.5, 0.01)
+    for bad in ({"k": [0.0] * 3}, {"d": [0.0] * 3}, {"tau": 0.0}, {"d": [18.0, 18.0, 17.0]}):
+        with pytest.raises(InputError, match="must be positive, and the same"):
+            filter_of(facts | bad, 1.0, PERIOD)
+    for bad in ({"k": []}, {"tau": "x"}, {"k": 5.0}):
+        with pytest.raises(InputError, match="does not state k, d and tau"):
+            filter_of(facts | bad, 1.0, PERIOD)
+    # Critically damped, the slower time is 2 tau/d: 6 s are a tenth of what it may be drawn out by.
+    slow = {"k": [100.0] * 3, "d": [20.0] * 3}
+    filter_of(slow | {"tau": 60.0}, 1.0, PERIOD)
+    with pytest.raises(InputError, match=r"within 6\.01 s"):
+        filter_of(slow | {"tau": 60.1}, 1.0, PERIOD)

@@ -116,3 +116,80 @@ def test_forces_count_against_the_force_and_torques_against_the_torque_alone():
     for limits in ((4.99, 0.51), (5.01, 0.49)):
         with pytest.raises(RefusedError):
             guards.check_wrench(np.concatenate([force, torque]), *limits)
+
+
+def test_what_is_met_exactly_is_kept_at_every_limit():
+    low, high = np.array(BOX[::2]), np.array(BOX[1::2])
+    for axis in range(3):
+        for border, out in ((low, -np.inf), (high, np.inf)):
+            place = 0.5 * (low + high)
+            place[axis] = border[axis]
+            guards.check_inside(place, BOX, "the tool")
+            place[axis] = np.nextafter(border[axis], out)
+            with pytest.raises(RefusedError, match=f"the tool at {'xyz'[axis]} = "):
+                guards.check_inside(place, BOX, "the tool")
+    wrench = np.array([0.0, 3.0, -4.0, 0.0, 0.75, 1.0])
+    guards.check_wrench(wrench, 5.0, 1.25)
+    with pytest.raises(RefusedError, match=r"force 5 N .* over 5 N|--max-force"):
+        guards.check_wrench(wrench, np.nextafter(5.0, 0.0), 1.25)
+    with pytest.raises(RefusedError, match="--max-torque"):
+        guards.check_wrench(wrench, 5.0, np.nextafter(1.25, 0.0))
+
+
+def test_the_following_error_is_that_of_the_nearest_set_point_up_to_its_limits():
+    trail = FollowingErrorMonitor(INFO, 0.02, 5.0, 0.1)
+    assert trail.strayed(state(PLACE + 99.0)) == (0.0, 0.0)
+    assert trail.last is None
+    trail.add(PLACE, LEVEL)
+    trail.add(PLACE + [8.0, 0.0, 0.0], exp(np.array([0.0, 0.0, 0.3])))
+    assert trail.last[0][0] == PLACE[0] + 8.0
+    trail.check(state(PLACE + [0.0, 3.0, 4.0]))
+    with pytest.raises(RefusedError, match=r"following error 5\.0"):
+        trail.check(state(PLACE + [0.0, 3.0, 4.0078125]))
+    # Place and attitude may be those of different ones.
+    distance, angle = trail.strayed(state(PLACE, exp(np.array([0.0, 0.0, 0.25]))))
+    assert (distance, angle) == (0.0, pytest.approx(0.05))
+    trail.check(state(PLACE, exp(np.array([0.0, 0.0, -0.0999]))))
+    with pytest.raises(RefusedError, match="following error"):
+        trail.check(state(PLACE, exp(np.array([0.0, 0.0, -0.1001]))))
+    with pytest.raises(RefusedError):
+        trail.check(state(NAN))
+
+
+@pytest.mark.parametrize(("lookahead", "kept"), [(0.0, 6), (0.1, 11), (0.105, 12)])
+def test_it_remembers_the_look_ahead_and_a_tenth_of_a_second(lookahead, kept):
+    trail = FollowingErrorMonitor(ServoInfo("fake", (0.002, 0.1), lookahead), 0.02, 5.0, 0.1)
+    for i in range(50):
+        trail.add(np.array([10.0 * i, 0.0, 0.0]), LEVEL)
+    oldest = 10.0 * (50 - kept)
+    assert trail.strayed(state(np.array([oldest, 0.0, 0.0])))[0] == 0.0
+    assert trail.strayed(state(np.array([oldest - 10.0, 0.0, 0.0])))[0] == 10.0
+
+
+def test_why_an_arm_is_not_ready_is_told_with_what_to_do():
+    with pytest.raises(RefusedError) as stopped:
+        guards.check_ready(state(mode="emergency stop"))
+    assert str(stopped.value) == (
+        "robot: emergency stop; release it and clear it on the pendant and try again"
+    )
+    with pytest.raises(RefusedError) as fault:
+        guards.check_ready(replace(state(mode="fault"), detail="axis 3"))
+    assert str(fault.value) == "robot: fault (axis 3); clear it on the pendant and try again"
+
+
+class Playing:
+    def upload(self, *_):
+        pass
+
+    def play(self):
+        pass
+
+
+def test_who_plays_whole_plans_is_asked_for_on_purpose():
+    guards.check_streams(object())
+    guards.check_playing(object(), allowed=False)
+    guards.check_playing(Playing(), allowed=True)
+    with pytest.raises(InputError, match="mode=file only plays"):
+        guards.check_streams(Playing())
+    with pytest.raises(InputError, match="--allow-file-mode"):
+        guards.check_playing(Playing(), allowed=False)

@@ -1,6 +1,7 @@
 """Outputs along a stroke: switched within a period of the place, and off at every stop."""
 
 import contextlib
+import dataclasses
 import json
 import signal
 
@@ -8,11 +9,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from dmpcli.control import outputs
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.outputs import OutputSwitch
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
-from dmpcli.errors import InstrumentError
+from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.planning.plan import PlannedStroke
 from dmpcli.spatial.output_events import OutputEvent
 from tests.commands.running import ended, invoke
@@ -227,3 +229,130 @@ def test_outputs_that_a_robot_has_not_are_refused_unless_they_are_to_be_ignored(
     done = invoke("execute", tmp_path / "t.parquet", "-o", out, "--ignore-events")
     assert done.exit_code == 0, done.stderr
     assert "glue: not switched, as --ignore-events asks" in done.stderr
+
+
+class Told:
+    """Remembers what it was told; fails for the names in `fails`."""
+
+    def __init__(self, fails=()):
+        self.fails, self.calls = set(fails), []
+
+    def check_output(self, name):
+        if name in self.fails:
+            raise InputError(f"robot: has no output {name}")
+
+    def switch(self, name, on):
+        self.calls.append((name, on))
+        if name in self.fails:
+            raise InstrumentError(f"no answer of {name}")
+
+
+def test_what_was_switched_on_twice_goes_off_once():
+    servo = Told()
+    switch = OutputSwitch(servo, 0.02, 0.0)
+    made = plan(with_events(*(OutputEvent(0.02 * k, "DO1", on=True) for k in range(3))))
+    for index in range(3):
+        switch.reach(made, float(index), 0.02 * index)
+        assert switch.act(0.02 * index) == ("on DO1", None)
+    assert switch.off() == "off DO1"
+    assert servo.calls == [("DO1", True)] * 3 + [("DO1", False)]
+    assert switch.off() == ""
+    switch.leave()
+    assert (switch.left, len(servo.calls)) == ("", 4)
+
+
+def test_what_is_off_already_may_be_switched_off():
+    servo = Told()
+    switch = OutputSwitch(servo, 0.02, 0.0)
+    switch.reach(plan(with_events(OutputEvent(0.0, "DO2", on=False))), 0.0, 0.0)
+    assert switch.act(0.0) == ("off DO2", None)
+    assert switch.off() == ""
+
+
+@pytest.mark.parametrize(("early", "due"), [(0.01, True), (0.0101, False)])
+def test_an_event_is_due_in_the_cycle_that_is_nearest_to_it(early, due):
+    """Set-point 10 at 1.5 s, one look-ahead of 0.25 s before the arm is there."""
+    switch = OutputSwitch(Told(), 0.02, 0.25)
+    made = plan(with_events(OutputEvent(0.2, "DO1", on=True)))
+    switch.reach(made, 9.0, 1.48)
+    assert not switch.waiting
+    switch.reach(made, 10.0, 1.5)
+    assert switch.waiting
+    assert bool(switch.act(1.75 - early)[0]) == due
+    assert switch.waiting != due
+
+
+def test_between_two_set_points_it_is_due_by_its_share_of_the_period():
+    switch = OutputSwitch(Told(), 0.02, 0.0)
+    made = plan(with_events(OutputEvent(0.215, "DO1", on=True)))  # three quarters from 10 to 11
+    switch.reach(made, 10.0, 1.5)
+    switch.reach(made, 11.0, 1.52)
+    # Three quarters of a period after 1.5 s; a cycle may come half a period before.
+    assert switch.act(1.5049 - 1e-6)[0] == ""
+    assert switch.act(1.5051)[0] == "on DO1"
+    # After missed deadlines the way between two set-points is no longer than a period.
+    late = OutputSwitch(Told(), 0.02, 0.0)
+    late.reach(made, 8.0, 1.46)
+    late.reach(made, 11.0, 1.52)
+    assert late.act(1.52 - 0.01 - 0.005 / 3.0 - 1e-6)[0] == ""
+    assert late.act(1.52 - 0.01 - 0.005 / 3.0 + 1e-6)[0] == "on DO1"
+
+
+def test_another_plan_is_reached_from_its_first_set_point_and_one_that_goes_on_is_not():
+    made = plan(with_events(OutputEvent(0.0, "DO1", on=True)))
+    again = dataclasses.replace(made)
+    for follows, count in ((False, 2), (True, 1)):
+        servo = Told()
+        switch = OutputSwitch(servo, 0.02, 0.0)
+        switch.reach(made, 0.0, 0.0)
+        if follows:
+            switch.follow(again)
+        switch.reach(again, 1.0, 0.02)
+        switch.act(1.0)
+        assert len(servo.calls) == count
+    OutputSwitch(Told(), 0.02, 0.0).follow(made)  # before anything was reached
+
+
+def test_what_cannot_be_switched_leaves_the_rest_undone_and_told():
+    servo = Told(["DO2"])
+    switch = OutputSwitch(servo, 0.02, 0.0)
+    names = ("DO1", "DO2", "DO3")
+    switch.reach(plan(with_events(*(OutputEvent(0.0, n, on=True) for n in names))), 0.0, 0.0)
+    done, failure = switch.act(0.0)
+    assert (done, str(failure)) == ("on DO1", "no answer of DO2")
+    assert switch.waiting
+    with pytest.raises(InstrumentError, match="DO2"):
+        switch.off()
+    assert not switch.waiting
+    switch.leave()
+    assert switch.left == "MAY STILL BE ON: DO2 (no answer of DO2); switch it off on the pendant"
+    assert servo.calls == [
+        ("DO1", True),
+        ("DO2", True),
+        ("DO1", False),
+        ("DO2", False),
+        ("DO2", False),
+    ]
+
+
+def test_how_a_run_ended_is_told_before_what_may_still_be_on():
+    assert outputs.failed("done", None, "") == ("done", None)
+    reason, failure = outputs.failed("done", None, "MAY STILL BE ON: DO1")
+    assert (reason, type(failure)) == ("done; MAY STILL BE ON: DO1", InstrumentError)
+    reason, failure = outputs.failed("stop", RefusedError("stop"), "MAY STILL BE ON: DO1")
+    assert (str(failure), type(failure)) == (reason, RefusedError)
+
+
+def test_outputs_that_a_robot_cannot_switch_are_refused_before_it_moves():
+    outputs.check(FakeServo(FakeClock()), [])
+    with pytest.raises(InputError, match=r"switches no outputs \(a, b\); --ignore-events"):
+        outputs.check(FakeServo(FakeClock()), ["a", "b"])
+    outputs.check(Told(), ["a"])
+    with pytest.raises(InputError, match="has no output b; --ignore-events draws without"):
+        outputs.check(Told(["b"]), ["a", "b"])
+    player = Told()
+    player.upload = player.play = lambda *_: None
+    with pytest.raises(InputError, match="plays the plan by itself"):
+        outputs.check(player, ["a"])
+    strokes = [with_events(*TWO), with_events(OutputEvent(0.0, "x", on=True), *TWO)]
+    assert outputs.names_of(strokes) == ["DO1", "x"]

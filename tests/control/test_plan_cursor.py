@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,36 @@ def test_braking_while_it_waits_is_done_at_once():
     cursor.advance()
     cursor.brake()
     assert cursor.finished
+
+
+def test_a_goal_that_moves_on_is_run_after_and_one_that_waits_is_waited_for():
+    made, longer = plan(stroke(duration=2.0)), plan(stroke(duration=3.0))
+    cursor = PlanCursor(made, WIDE)
+    run(cursor, cycles=50)
+    cursor.follow(longer)
+    indices, _ = run(cursor)
+    assert indices[-1] == len(longer) - 1
+    # A plan whose stroke begins at its end holds there until it is released.
+    short = PlanCursor(replace(made, lead=100, last=100), WIDE, wait=True)
+    run(short, cycles=130)
+    assert (short.index, short.waiting, short.finished) == (100.0, True, False)
+    assert short.phase == "approach"
+    short.release()
+    assert short.finished
+    assert short.phase == "stroke"
+    short.advance()
+    assert (short.phase, short.index) == ("stop", 100.0)
+
+
+def test_brought_to_rest_twice_the_first_time_counts():
+    cursor = PlanCursor(plan(), WIDE)
+    run(cursor, cycles=250)
+    cursor.brake()
+    run(cursor, cycles=3)
+    before = cursor._brake
+    cursor.brake()
+    assert cursor._brake == before
+    # Half of the ramp's duration is what it runs over.
+    begun, duration = before
+    indices, _ = run(cursor)
+    assert indices[-1] == pytest.approx(begun + duration / 2.0 / 0.02)

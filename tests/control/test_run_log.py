@@ -1,8 +1,9 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from dmpcli.control.run_log import Row, RunLog
+from dmpcli.control.run_log import Row, RunLog, recovered
 from dmpcli.records import record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
@@ -56,3 +57,50 @@ def test_a_wrench_that_is_missing_in_one_row_is_not_a_number():
     cols = columns([row(0), row(1, np.arange(6.0))], oriented=True, sensed=True, coupled=False)
     assert np.isnan(cols["fz"][0])
     assert [cols[n][1] for n in ("fx", "fz", "tz")] == [0.0, 2.0, 5.0]
+
+
+def test_every_value_of_a_row_stands_in_its_column():
+    lean, goal = np.array([0.1, 0.2, 0.97]), np.array([7.0, 8.0, 9.0])
+    known = replace(
+        row(1, np.arange(6.0)), t=0.5, t_plan=0.25, deadline=0.75, lateness=0.125, coupling=-1.5,
+        force=3.0, contact="drawing", state="fault", phase="retract", id="a", event="on DO1",
+        goal=goal, normal=lean, joints=np.arange(6.0) + 0.5,
+    )  # fmt: skip
+    without = replace(
+        known, wrench=None, goal=None, normal=None, joints=np.zeros(7), id=None, event=""
+    )
+    log = RunLog(sensed=True, coupled=True, joints=6, switching=True, moving=True)
+    for i, one in enumerate((known, without)):
+        log.add(200.0 + i, one)
+    cols = log.columns()
+    for name, value in {
+        "t": 0.5, "t_plan": 0.25, "deadline": 0.75, "lateness": 0.125, "coupling": -1.5, "fn": 3.0,
+        "contact": "drawing", "state": "fault", "phase": "retract", "id": "a", "event": "on DO1",
+        "fx": 0.0, "tz": 5.0, "nx_felt": 0.1, "nz_felt": 0.97, "xg": 7.0, "zg": 9.0, "q1": 0.5,
+        "q6": 5.5, "x_plan": START[0] + 1, "x_sent": START[0] + 1, "x": START[0],
+    }.items():  # fmt: skip
+        assert cols[name][0] == value, name
+    for name in ("fx", "nx_felt", "xg", "q1"):
+        assert np.isnan(cols[name][1]), name
+    assert (cols["id"][1], cols["event"][1], cols["contact"][1]) == (None, None, "drawing")
+    np.testing.assert_array_equal(log.rows.numbers("clock"), [200.0, 201.0])
+    assert len(log) == 2
+
+
+def test_a_normal_that_was_never_felt_is_no_column():
+    cols = columns([row(0)], coupled=True)
+    assert "nx_felt" not in cols
+    assert cols["fn"][0] == 0.0
+    assert "event" not in cols
+    assert "xg" not in cols
+    assert len(columns([replace(row(0), joints=np.zeros(7))], joints=7)) > len(columns([row(0)]))
+
+
+def test_of_a_run_that_only_a_journal_is_left_of_the_times_are_told_by_its_rows():
+    deadlines = np.array([0.0, 0.02, 0.04, 0.1, 0.12])
+    late = np.array([1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
+    found = recovered({"deadline": deadlines, "lateness": late}, {"period": 0.02})
+    assert (found["completed"], found["missed"]) == (False, 2)
+    assert found["lateness"]["max"] == pytest.approx(5e-3)
+    assert found["lateness"]["p50"] == pytest.approx(3e-3)
+    assert found["reason"] == "recovered after a crash"

@@ -7,15 +7,17 @@ import pytest
 from dmpcli.admittance.force_coupling import fast_filter
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
-from dmpcli.control.cycle import ReadyArm, StopLimits
+from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import ForceInput, ForceTracker
+from dmpcli.control.playback import Playback
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
-from dmpcli.errors import InstrumentError, RefusedError
+from dmpcli.control.stopping import StopOutcome
+from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.spatial.rotations import exp
-from tests.control.fake_sensors import PolledSensor
+from tests.control.fake_sensors import PolledSensor, StreamingSensor
 from tests.control.streaming_fakes import (
     PEN_DOWN,
     START,
@@ -429,6 +431,51 @@ def test_where_contact_is_lost_for_good_it_comes_to_rest_and_says_so():
     assert bench.loop.stop_outcome.confirmed
 
 
+def test_a_wall_is_told_by_what_is_felt_until_the_arm_stands():
+    """800 N/s for 60 ms, from 5 ms before a reading on: the cycle that ends it feels a part."""
+    met = []
+
+    def feel(t):
+        height = bench.servo.position[2]
+        side = 800.0 * min(max(t - met[0], 0.0), 0.06) if met else 0.0
+        return np.array([side, 0.0, 2.0 * max(START[2] - height, 0.0), 0.0, 0.0, 0.0])
+
+    at = drawing()
+    bench = pressing(at={at: lambda servo: met.append(bench.clock.now() + 0.005)})
+    streaming = StreamingSensor(bench.clock, feel)
+    streaming.start(100.0)
+    bench.sensor.poll = streaming.poll
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    wall = bench.loop.pressing.facts()["contact"]["wall"]
+    assert wall["largest"] == pytest.approx(48.0, abs=0.1)
+    assert wall["across"] < 16.0
+    # The sensor's interval, the delay and a period.
+    reaction = bench.loop.pressing.supervisor.delay + PERIOD + 0.01
+    assert wall["unavoidable"] == pytest.approx(800.0 * reaction, rel=0.01)
+    x = bench.plan.position[:, 0]
+    speed = np.abs(np.diff(x)).max() / PERIOD
+    assert 0.3 * speed < wall["speed"] <= speed
+    assert wall["stiffness"] == pytest.approx(800.0 / wall["speed"], rel=0.01)
+    assert f"{wall['unavoidable']:.1f} N are unavoidable" in outcome.reason
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.03])
+def test_how_far_the_zero_has_moved_is_seen_where_the_tool_is_clear_at_last(drift):
+    def feel(t):
+        push = 2.0 * max(START[2] - bench.servo.position[2], 0.0)
+        return np.array([0.0, 0.0, push + drift * (t - 100.0), 0.0, 0.0, 0.0])
+
+    bench = pressing()
+    streaming = StreamingSensor(bench.clock, feel)
+    streaming.start(100.0)
+    bench.sensor.poll = streaming.poll
+    assert bench.run().reason == DONE
+    seeks = next(row.t for row in bench.rows if row.contact == "seeking")
+    found = bench.loop.pressing.facts()["contact"]["zero_drift"]
+    assert found == pytest.approx(drift * (bench.rows[-1].t - seeks), abs=0.02)
+
+
 @pytest.mark.slow
 def test_a_wall_stops_it_in_the_cycle_that_feels_it():
     at = drawing()
@@ -607,3 +654,155 @@ def test_a_hindrance_decelerates_and_is_what_the_run_ends_with():
     sent = np.array([row.sent[0] for row in rows])
     assert np.linalg.norm(np.diff(sent, 2, axis=0), axis=1).max() / PERIOD**2 <= WIDE.acceleration
     assert len(rows) < 300
+
+
+def test_why_a_set_point_was_not_taken_is_asked_of_the_arm():
+    """Between its look at the arm and the set-point it was stopped."""
+    bench = Bench()
+    send = bench.servo.send
+
+    def refusing(position, rotation):
+        if len(bench.servo.sent) < 100:
+            return send(position, rotation)
+        bench.servo.mode = "emergency stop"
+        return False
+
+    bench.servo.send = refusing
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    assert "emergency stop" in outcome.reason
+    last = bench.rows[-1]
+    assert last.state == "ready"
+    np.testing.assert_array_equal(last.sent[0], bench.plan.position[100])
+
+
+def test_a_row_says_what_was_planned_sent_and_felt_in_its_cycle():
+    made = plan(stroke(2.0, normal=(0, 0, 1)), start=(START + [0.0, 0.0, 2.0], PEN_DOWN))
+    bench = Bench(made, presses=True)
+    bench.servo.position = made.position[0]
+    bench.sensor.plate = START[2] - 0.5
+    assert bench.run().reason == DONE
+    first = bench.rows[0]
+    np.testing.assert_array_equal(first.actual[0], made.position[0])
+    drawn = [row for row in bench.rows if row.id]
+    assert {row.id for row in drawn} == {"0"}
+    assert [row.id for row in bench.rows[: made.lead]] == [None] * made.lead
+    for row in drawn:
+        off = row.sent[0] - row.planned[0]
+        np.testing.assert_allclose(off[:2], 0.0, atol=1e-12)
+        assert row.force == 5.0
+    # Off the stroke no coupling counts, and no force is wanted.
+    for row in bench.rows[: made.lead]:
+        assert (row.coupling, row.force) == (0.0, 0.0)
+    assert any(row.coupling for row in drawn)
+    # It waits at the stroke's start, in the approach, until it presses.
+    states = list(dict.fromkeys(row.contact for row in bench.rows))
+    assert states == ["free", "seeking", "landing", "drawing", "retreating"]
+    waiting = [row for row in drawn if row.phase == "approach"]
+    assert {row.t_plan for row in waiting} == {0.0}
+    settled = next(i for i, row in enumerate(bench.rows) if row.contact == "drawing")
+    pressed = [row.wrench[2] for row in bench.rows[settled:] if row.phase == "stroke"]
+    assert min(pressed) > 4.0
+
+
+def test_a_stroke_counts_as_drawn_by_its_share_in_contact():
+    for least, counts in ((0.6, True), (0.9, False)):
+        bench = Bench(plan(stroke(4.0, normal=(0, 0, 1))), presses=True)
+        supervisor = bench.loop.pressing.supervisor
+        supervisor.policy = dataclasses.replace(
+            supervisor.policy, on_loss="hold", least_share=least
+        )
+
+        def lifted(_, bench=bench):
+            bench.sensor.plate = START[2] - 60.0
+
+        def back(servo, bench=bench):
+            bench.sensor.plate = servo.position[2] + 2.5
+
+        begun = _landed(bench)
+        bench.servo.at = {begun + 60: lifted, begun + 110: back}
+        outcome = bench.run()
+        share = bench.loop.pressing.tally.share("0")
+        assert 0.6 < share < 0.9
+        assert (bench.loop.drawn == ["0"]) is counts
+        assert (outcome.failure is None) is counts
+        if not counts:
+            assert f"{100.0 * share:.1f} % of it, under 90 % (--min-contact)" in outcome.reason
+
+
+def _landed(bench):
+    """After how many cycles a run of the same plan draws."""
+    trial = Bench(bench.plan, presses=True)
+    trial.run()
+    return next(i for i, row in enumerate(trial.rows) if row.contact == "drawing")
+
+
+def test_strokes_that_were_hardly_touched_are_told_with_how_many_there_are():
+    bench = Bench(plan(stroke(1.0, normal=(0, 0, 1))), presses=True)
+    loop = bench.loop
+    loop._short = {"a": 0.5}
+    assert "stroke a was in contact on 50.0 % of it, under 95 % (--min-contact): it" in str(
+        loop._untouched()
+    )
+    loop._short = {"a": 0.5, "b": 0.4, "c": 0.3}
+    assert "(--min-contact), and 2 more: it does not count" in str(loop._untouched())
+    loop._interruption.receive(2)
+    assert loop._untouched() is None
+
+
+def test_how_long_all_plans_take_is_told_before_and_with_a_goal_that_moves():
+    first, second = plan(stroke(1.0)), plan(stroke(2.0))
+    clock = FakeClock()
+    servo = FakeServo(clock)
+    arm = ReadyArm(servo, servo.info, clock, 6)
+    loop = ServoLoop(first, WIDE, WATCH, arm, then=[second])
+    assert (loop.period, loop.duration) == (0.02, pytest.approx(0.02 * (51 + 101)))
+    assert "joints" in loop.log.rows.groups
+    assert loop.pressing is None
+    assert not loop.virtual
+    loop._follow(second)
+    assert loop.duration == pytest.approx(0.02 * (101 + 101))
+
+
+def test_what_feels_belongs_to_a_virtual_lab_or_not():
+    bench = Bench(plan(stroke(normal=(0, 0, 1))), presses=True)
+    assert not bench.loop.virtual
+    info = dataclasses.replace(bench.loop._touch.sensing.info, serial="virtual")
+    bench.loop._touch.sensing.info = info
+    assert bench.loop.virtual
+
+
+def test_an_arm_that_plays_by_itself_is_neither_coupled_nor_led_to_another_goal():
+    bench = Bench(plan(stroke(1.0, normal=(0, 0, 1))), presses=True)
+    arm = ReadyArm(bench.servo, bench.servo.info, bench.clock)
+    with pytest.raises(InputError, match="--coupling force: corrects each set-point"):
+        Playback(bench.plan, WIDE, WATCH, arm, bench.loop._touch)
+    with pytest.raises(InputError, match="--goal-from: moves each set-point"):
+        Playback(bench.plan, WIDE, WATCH, arm, goals=object())
+
+
+def test_an_arm_says_how_many_joints_it_tells():
+    clock = FakeClock()
+    servo = FakeServo(clock)
+    arm = ReadyArm(servo, servo.info, clock)
+    assert arm.as_told().joints == 0
+    state = servo.state
+    servo.state = lambda: dataclasses.replace(state(), joints=np.zeros(6))
+    assert arm.as_told() == ReadyArm(servo, servo.info, clock, 6)
+
+
+def test_the_first_failure_counts_and_an_arm_that_may_move_comes_last():
+    first, second = RefusedError("first"), InstrumentError("second")
+    plain = LoopOutcome("done", signal=2)
+    assert plain.unless(None) is plain
+    failed = plain.unless(first)
+    assert (failed.reason, failed.failure, failed.signal) == ("first", first, None)
+    assert failed.unless(second) is failed
+    assert plain.error() is None
+    told = failed.error("before ", " after")
+    assert (type(told), str(told)) == (RefusedError, "before first after")
+    left = StopOutcome("not told", "no answer")
+    both = LoopOutcome("first", first, stop=left)
+    assert str(both.error("", "; 1 of 2")) == f"first; 1 of 2\n{left}"
+    alone = LoopOutcome(str(left), left.error(), stop=left)
+    assert str(alone.error("", "; 1 of 2")) == f"1 of 2\n{left}"

@@ -94,3 +94,14 @@ def test_the_third_signal_is_the_last_that_is_counted():
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
     assert handlers() == before
+
+
+def test_a_signal_that_was_ignored_is_counted_but_for_that_of_the_terminals_end():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with Interruption() as interruption:
+        assert signal.getsignal(signal.SIGINT) == interruption.receive
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        for _ in range(3):
+            interruption.receive(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN

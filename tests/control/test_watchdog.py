@@ -223,3 +223,71 @@ def test_it_offers_what_the_arm_offers():
     servo = Draggable()
     watched(servo).drag()
     assert servo.calls == ["drag"]
+
+
+class Player(Servo):
+    def upload(self, position, rotation, period, meanwhile):
+        self.calls.append(("upload", position, rotation, period))
+        meanwhile()
+
+    def play(self):
+        self.calls.append("play")
+
+    def check_output(self, name):
+        self.calls.append(f"check {name}")
+
+    def switch(self, name, on):
+        self.calls.append((name, on))
+
+
+def test_all_that_the_arm_offers_is_passed_on():
+    servo, meanwhile = Player(), []
+    dog = watched(servo)
+    before = dog._seen
+    dog.upload(HERE, LEVEL, PERIOD, lambda: meanwhile.append(1))
+    assert dog._seen > before
+    before, dog._seen = dog._seen, 0.0
+    dog.play()
+    assert dog._seen >= before
+    dog.check_output("DO1")
+    dog.switch("DO1", True)
+    dog.switch("DO1", True)
+    assert dog._outputs == ["DO1"]
+    dog.switch("DO2", False)
+    dog.switch("DO1", False)
+    assert dog._outputs == []
+    assert servo.calls == [
+        ("upload", HERE, LEVEL, PERIOD), "play", "check DO1",
+        ("DO1", True), ("DO1", True), ("DO2", False), ("DO1", False),
+    ]  # fmt: skip
+    assert meanwhile == [1]
+    for name in ("upload", "play", "switch", "check_output", "drag"):
+        assert not hasattr(watched(Servo()), name)
+
+
+def test_outputs_that_are_on_go_off_with_the_arm_and_none_goes_on_after():
+    servo = Player()
+    dog = watched(servo)
+    dog.open()
+    dog.start(PERIOD)
+    dog.switch("DO1", True)
+    dog.switch("DO2", True)
+    assert dog._settled.wait(30.0)
+    assert servo.calls[-3:] == ["stop", ("DO1", False), ("DO2", False)]
+    with pytest.raises(InstrumentError, match="did not come round"):
+        dog.switch("DO3", True)
+    dog.switch("DO1", False)
+    dog._done.set()  # the loop has stopped the arm too
+    dog.switch("DO3", True)
+    assert servo.calls[-1] == ("DO1", False)
+    dog.stop()
+
+
+@pytest.mark.parametrize(("period", "limit"), [(0.002, 0.05), (0.02, 0.1)])
+def test_it_waits_for_five_periods_or_a_look_ahead(period, limit):
+    dog = watched(Servo())
+    dog.open()
+    dog.start(period)
+    assert dog._limit == pytest.approx(limit)
+    dog.stop()
+    assert dog._thread is None

@@ -1,6 +1,7 @@
 """The live view: a person sees a run, the loop does not know, and nothing is drawn elsewhere."""
 
 import contextlib
+import io
 import os
 import pty
 import signal
@@ -19,6 +20,8 @@ from dmpcli.control import watching
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.live_view import SIZE, RowView, SharedRow
 from tests.commands.test_execute import columns, written
+from tests.control.streaming_fakes import plan, stroke
+from tests.control.test_servo_loop import Bench
 
 DMPCLI = str(Path(sys.executable).with_name("dmpcli"))
 
@@ -229,3 +232,141 @@ def test_a_view_that_cannot_be_had_costs_nothing(monkeypatch):
     view = watching.RunView("executing", logged(0).rows, 0.02)
     with watching.live(lambda: view, True) as ended:
         ended("done")
+
+
+class Screen:
+    """A process that draws, as far as the loop's side knows it."""
+
+    pid = 4711
+
+    def __init__(self, said=b"", ended=None):
+        ours, theirs = os.pipe()
+        os.write(theirs, said)
+        self.stdout, self._theirs = os.fdopen(ours, "rb", buffering=0), theirs
+        self.stdin, self.ended, self.calls = io.StringIO(), ended, []
+        self.hangs = False
+
+    def poll(self):
+        return self.ended
+
+    def wait(self, patience=None):
+        self.calls.append(f"wait {patience}")
+        if self.hangs and patience is not None:
+            raise subprocess.TimeoutExpired("view", patience)
+
+    def kill(self):
+        self.calls.append("kill")
+
+    def leave(self):
+        os.close(self._theirs)
+        self.stdout.close()
+
+
+@pytest.fixture
+def screen():
+    made = []
+
+    def make(*given, **more):
+        made.append(Screen(*given, **more))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.leave()
+
+
+def test_the_view_is_waited_for_until_it_says_that_it_is_ready(screen, monkeypatch):
+    seen = screen(live_view.READY + b"more")
+    watching._await(seen)
+    assert os.read(seen.stdout.fileno(), 99) == b"more"
+    monkeypatch.setattr(watching, "_PATIENCE", 0.01)
+    watching._await(screen())  # and not for ever
+
+
+def test_the_view_is_told_a_line_at_a_time_and_why_the_run_ended(screen, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        os,
+        "sched_setscheduler",
+        lambda pid, kind, given: asked.append((pid, kind, given)),
+        raising=False,
+    )
+    seen = screen()
+    assert watching._written(seen, live_view.ABOVE, 'a "word"')
+    watching._ended(seen, "done")
+    assert seen.stdin.getvalue() == '+"a \\"word\\""\n="done"\n'
+    assert asked == [(4711, os.SCHED_OTHER, os.sched_param(0))]
+
+
+def test_a_view_that_is_gone_is_told_nothing(screen):
+    gone = screen(ended=0)
+    assert not watching._written(gone, live_view.ABOVE, "a")
+    assert gone.stdin.getvalue() == ""
+    closed = screen()
+    closed.stdin.close()
+    assert not watching._written(closed, live_view.ABOVE, "a")
+    closed.stdin = None
+    assert not watching._written(closed, live_view.ABOVE, "a")
+
+
+def test_a_view_has_its_time_to_end_and_is_then_ended(screen):
+    seen = screen()
+    watching._end(seen)
+    assert (seen.stdin.closed, seen.stdout.closed) == (True, True)
+    assert seen.calls == [f"wait {watching._PATIENCE}"]
+    stuck = screen()
+    stuck.hangs, stuck.stdin = True, None
+    watching._end(stuck)
+    assert stuck.calls == [f"wait {watching._PATIENCE}", "kill", "wait None"]
+
+
+def test_while_it_is_watched_rows_and_messages_go_to_the_view(screen, monkeypatch):
+    monkeypatch.setattr(watching, "watched", lambda: True)
+    seen, started = screen(live_view.READY), []
+
+    def popen(words, **given):
+        started.append((words, given))
+        return seen
+
+    monkeypatch.setattr(watching.subprocess, "Popen", popen)
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: None, raising=False)
+    log = logged(0)
+    with watching.live(lambda: watching.RunView("executing", log.rows, 0.02, 3.0), True) as ended:
+        assert log.rows.mirror is not None
+        add(log, range(3))
+        [(words, given)] = started
+        file = int(words[3])
+        assert given["pass_fds"] == (file,)
+        assert (given["stdin"], given["stdout"], given["text"]) == (-1, -1, True)
+        assert given["start_new_session"]
+        view = RowView.of_json(words[4])
+        assert (view.title, view.period, view.whole) == ("executing", 0.02, 3.0)
+        assert SharedRow(file, view).read()["pose"][0] == 2.0
+        ended("done")
+        assert seen.stdin.getvalue().endswith('="done"\n')
+    assert log.rows.mirror is None
+    assert seen.stdin.closed
+    assert seen.calls == [f"wait {watching._PATIENCE}"]
+
+
+def test_nothing_is_watched_where_nobody_asks_or_sits_there(monkeypatch):
+    def never():
+        raise AssertionError
+
+    monkeypatch.setattr(watching, "watched", lambda: True)
+    with watching.live(never, False) as ended:
+        ended("done")
+    monkeypatch.setattr(watching, "watched", lambda: False)
+    with watching.live(never, True) as ended:
+        ended("done")
+
+
+def test_a_view_of_plans_shows_the_share_of_all_of_them():
+    bench = Bench(plan(stroke(1.0)))
+    view = watching.of_plan(bench.loop)
+    assert (view.title, view.rows, view.period) == ("executing", bench.loop.log.rows, 0.02)
+    assert view.whole == pytest.approx(51 * 0.02)
+    assert (view.of_rows().groups, view.of_rows().texts) == (
+        view.rows.groups,
+        list(view.rows.texts),
+    )

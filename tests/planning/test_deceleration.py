@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmpcli.planning import deceleration
@@ -59,3 +59,31 @@ def test_jerk_of_the_ramp_stays_inside_the_limit():
 
 def test_what_stands_still_stops_at_once():
     assert deceleration.duration(0.0, 0.0, 1000.0, 1000.0) == 0.0
+
+
+@settings(max_examples=25)
+@given(
+    speed=st.floats(1.0, 250.0),
+    share=st.floats(0.0, 0.95),
+    limit=st.floats(500.0, 5000.0),
+)
+def test_it_takes_no_longer_than_the_worst_moment_asks(speed, share, limit):
+    """There it takes all of the limit, but for what 200 steps leave out."""
+    duration = deceleration.duration(speed, share * limit, limit, 1e12)
+    r = 1.0 - u**2 * (3.0 - 2.0 * u)
+    braking = speed * 6.0 * u * (1.0 - u) / duration
+    assert np.max(share * limit * r**2 + braking) >= limit * 0.999
+
+
+def test_a_plan_that_takes_all_of_the_limit_uses_its_last_hundredth():
+    assert deceleration.duration(100.0, 1000.0, 1000.0, 1e12) == (
+        deceleration.duration(100.0, 990.0, 1000.0, 1e12)
+    )
+    assert deceleration.duration(100.0, 5000.0, 1000.0, 1e12) == (
+        deceleration.duration(100.0, 990.0, 1000.0, 1e12)
+    )
+
+
+def test_a_ramp_that_only_its_jerk_limits_takes_the_whole_of_it():
+    assert deceleration.duration(200.0, 0.0, 1e12, 30_000.0) == pytest.approx(0.2)
+    assert deceleration.progress(-1.0, 0.4) == 0.0

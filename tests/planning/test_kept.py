@@ -5,17 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dmpcli.dmp.goal_step import GoalFilter
 from dmpcli.errors import DmpError
 from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
-from dmpcli.planning import deceleration, plan, preflight, transfers
-from dmpcli.planning.limits import Limits
+from dmpcli.planning import deceleration, goal_course, plan, preflight, transfers
+from dmpcli.planning.limits import Limits, limits_of
 from dmpcli.planning.spline import between, spline, window
+from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial import rotations
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, stroke
 from tests.kept import Kept
 
 KEPT = Kept(__file__)
+LIMITS_OF = (
+    *("max_speed", "max_acceleration", "max_jerk"),
+    *("max_rotation_speed", "max_rotation_acceleration", "max_rotation_jerk"),
+)
 TIGHT = Limits(20.0, 30.0, 300.0, 0.1, 0.2, 1.0, (-650.0, -540.0, 100.0, 150.0, -30.0, 0.0))
 UP = (0.0, 0.0, 1.0)
 
@@ -149,6 +155,55 @@ def ramps_and_splines():
         near, share = window(index, 30)
         found += [near, share, between(y[near], share)]
     return found
+
+
+@KEPT.case
+def verdicts_in_words():
+    found: list = []
+    reach = Reach(models.model("ec66"))
+    for source in strokes()[:3]:
+        for by in ([0.0, 0.0, 0.0], [-350.0, 120.0, 0.0], [500.0, -80.0, 60.0]):
+            moved = replace(source, position=source.position + np.array(by))
+            start = moved.position[0] + [0.0, 20.0, 9.0], turned([0.0, 0.0, 0.2])
+            one = plan.make(moved, 0.02, 1.0, WIDE, start, 60.0)
+            for limits in (WIDE, TIGHT):
+                checks = preflight.within_limits(one, moved, limits)
+                checks += preflight.at_rest(moved, 2.0, 0.02, limits)
+                found += [[c.t, c.row, c.place, c.remedy] for c in checks]
+            found += [[str(c) for c in preflight.by_joints(one, moved, reach, None)[0]]]
+    quick = replace(strokes()[0], t=strokes()[0].t / 4.0)
+    one = plan.make(quick, 0.004, 1.0, WIDE, poses()[0], 25.0)
+    checks, joints = preflight.by_joints(
+        one, quick, reach, np.array([0.1, -1.5, 1.4, -1.5, -1.5, 0])
+    )
+    return [*found, [str(c) for c in checks], joints]
+
+
+@KEPT.case
+def goals_that_move():
+    source = stroke(2.0, 50.0, 0.4, normal=UP)
+    source = replace(source, force=2.0 + np.sin(np.arange(len(source.t))))
+    way = transfers.TransferOptions(8.0, 60.0, 30.0, 10.0, 4)
+    [base] = transfers.plans([source], 0.02, 1.0, WIDE, poses()[0], True, way)
+    reach = Reach(models.model("ec66"))
+    joints = reach.follow(base.position[None], base.rotation[None], 0.02).joints[0]
+    filter_ = GoalFilter(100.0, 25.0, 1.0, 0.02)
+    course, found = goal_course.first(base, joints), []
+    for at, shift in ((10, [4.0, -3.0, 0.0]), (60, [-9.0, 2.0, 0.0]), (97, [30.0, 0.0, 1.0])):
+        made = goal_course.moved(base, course, filter_, np.array(shift), at)
+        assert made is not None
+        found += [made.plan, made.states, made.goal, goal_course.slices(course, at, filter_)]
+        for limits in (WIDE, replace(WIDE, workspace=TIGHT.workspace), TIGHT):
+            *more, last = goal_course.judged(made, course, limits, reach)
+            found += [len(more), last if isinstance(last, str) else last.joints]
+        course = last if not isinstance(last, str) else replace(made, joints=None)
+    return found
+
+
+@KEPT.case
+def limits_as_they_are_set():
+    numbers = dict(zip(LIMITS_OF, range(3, 9), strict=True))
+    return [limits_of(ExecuteSettings(**numbers)), limits_of(ExecuteSettings(workspace=(0.0,) * 6))]
 
 
 @KEPT.case

@@ -1,8 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dmpcli.planning.plan import gap
+from dmpcli.errors import InputError
+from dmpcli.planning import plan as planning
+from dmpcli.planning.limits import Limits
+from dmpcli.planning.plan import PlanSegment, gap, joined, sample, straight
 from dmpcli.spatial import rotations
+from dmpcli.spatial.output_events import OutputEvent
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, sine, stroke
 from tests.minimum_jerk import minimum_jerk
 
@@ -121,3 +127,133 @@ def test_derivatives_of_a_known_turn_are_about_base_axes():
     assert velocity[:, 1].sum(axis=0) * 0.02 == pytest.approx(turned, abs=1e-9)
     assert np.abs(acceleration[:, 1]).max() == pytest.approx(5.7735 * 0.008, rel=1e-2)
     assert np.abs(jerk[:, 1, :2]).max() < 1e-6
+
+
+def way(start, goal, limits, speed=1e6, spare=0.0, period=0.001):
+    return straight("transfer", start, goal, period, limits, speed, spare)
+
+
+def lasting(duration, period=0.001):
+    """Set-points of a way of this duration, within a period."""
+    return pytest.approx(duration / period, abs=1.0)
+
+
+FREE = Limits(1e9, 1e12, 1e15, 1e9, 1e12, 1e15)
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "duration"),
+    [
+        # Of 40 mm and 0.5 rad by the peaks of minimum jerk: 1.875, 5.7735 and 60.
+        ("speed", 50.0, 1.875 * 40.0 / 50.0),
+        ("acceleration", 100.0, np.sqrt(5.7735 * 40.0 / 100.0)),
+        ("jerk", 500.0, np.cbrt(60.0 * 40.0 / 500.0)),
+        ("rotation_speed", 0.4, 1.875 * 0.5 / 0.4),
+        ("rotation_acceleration", 1.5, np.sqrt(5.7735 * 0.5 / 1.5)),
+        ("rotation_jerk", 7.0, np.cbrt(60.0 * 0.5 / 7.0)),
+    ],
+)
+def test_a_straight_way_takes_as_long_as_its_nearest_limit_asks(name, most, duration):
+    goal = (START + [24.0, -32.0, 0.0], rotations.exp(np.array([0.0, 0.3, 0.4])) @ PEN_DOWN)
+    made = way((START, PEN_DOWN), goal, replace(FREE, **{name: most}))
+    assert len(made.position) == lasting(duration)
+    np.testing.assert_array_equal(made.position[0], START)
+    share = minimum_jerk(np.arange(len(made.position)) / len(made.position))
+    np.testing.assert_allclose(made.position, START + share[:, None] * [24.0, -32.0, 0.0])
+    turned = rotations.log(made.rotation @ PEN_DOWN.T)
+    np.testing.assert_allclose(turned, share[:, None] * [0.0, 0.3, 0.4], atol=1e-9)
+
+
+def test_a_way_is_no_faster_than_asked_and_slower_by_what_a_coupling_may_add():
+    goal = (START + [0.0, 0.0, 30.0], PEN_DOWN)
+    asked = way((START, PEN_DOWN), goal, FREE, speed=20.0)
+    assert len(asked.position) == lasting(1.875 * 30.0 / 20.0)
+    spared = way((START, PEN_DOWN), goal, FREE, speed=20.0, spare=10.0)
+    assert len(spared.position) == lasting(1.875 * 40.0 / 20.0)
+
+
+@pytest.mark.parametrize(
+    ("off", "turn", "count"),
+    [(0.00099, 0.0, 0), (0.00101, 0.0, 1), (0.0, 1.9e-5, 0), (0.0, 2.1e-5, 1)],
+)
+def test_an_arm_that_stands_at_the_goal_needs_no_way(off, turn, count):
+    start = (START + [off, 0.0, 0.0], rotations.exp(np.array([turn, 0.0, 0.0])) @ PEN_DOWN)
+    assert bool(len(way(start, (START, PEN_DOWN), WIDE).position)) == bool(count)
+
+
+def forced(force):
+    source = stroke(duration=1.0, rate=10.0)
+    return replace(
+        source, force=np.array(force, dtype=float), normal=np.tile([0.0, 0.0, 2.0], (11, 1))
+    )
+
+
+def test_a_force_is_linear_between_two_samples_that_press_and_none_beside_a_lifted_one():
+    made = plan(forced([0, 0, 4, 6, 6, 6, 0, 0, 3, 3, 3]))
+    at = np.arange(51) * 0.02 / 0.1  # in samples of the file
+    inside = ((at >= 2 - 1e-9) & (at <= 5 + 1e-9)) | (at >= 8 - 1e-9)
+    wanted = np.where(inside, np.interp(at, np.arange(11), [0, 0, 4, 6, 6, 6, 0, 0, 3, 3, 3]), 0.0)
+    np.testing.assert_allclose(made.force, wanted)
+    np.testing.assert_allclose(made.normal, np.tile([0.0, 0.0, 1.0], (51, 1)))
+
+
+def test_what_is_switched_lies_on_the_strokes_own_time_from_its_first_sample():
+    source = stroke(duration=2.0)
+    events = (OutputEvent(3.0, "DO1", on=True), OutputEvent(3.55, "DO1", on=False))
+    made = plan(
+        replace(source, t=source.t + 3.0, events=events), speed=0.5, start=(START + 5.0, PEN_DOWN)
+    )
+    assert made.t[made.lead] == 0.0
+    assert [at for at, _ in made.events] == pytest.approx([made.lead, made.lead + 55.0])
+    assert [event.t for _, event in made.events] == pytest.approx([0.0, 0.55])
+    np.testing.assert_array_equal(made.t[: made.lead], 0.0)
+    assert made.t[made.last] == pytest.approx(2.0)
+
+
+def test_ways_hold_what_the_strokes_ends_say():
+    sampled = sample(forced(np.arange(11.0)), 0.1, 1.0, PEN_DOWN)
+    here = PlanSegment("approach", np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)))
+    there = PlanSegment("retract", np.ones((3, 3)), np.tile(np.eye(3), (3, 1, 1)))
+    empty = PlanSegment("transfer", np.empty((0, 3)), np.empty((0, 3, 3)))
+    made = joined(sampled, [empty, here], [there], 0.1, False)
+    assert (made.lead, made.last, len(made)) == (2, 12, 16)
+    assert made.legs == (("approach", 0), ("stroke", 2), ("retract", 13))
+    np.testing.assert_allclose(made.force, [0, 0, *range(11), 10, 10, 10])
+    np.testing.assert_allclose(made.t, [0, 0, *(0.1 * np.arange(11)), 1, 1, 1])
+    assert [made.phase_at(i) for i in (0, 1.5, 2, 12.5, 13, 15)] == (
+        ["approach", "approach", "stroke", "stroke", "retract", "retract"]
+    )
+    assert [made.draws_at(i) for i in (1.9, 2, 12, 12.1)] == [False, True, True, False]
+    np.testing.assert_array_equal(made.position[[1, 13]], [[0, 0, 0], [1, 1, 1]])
+    # At the very end, and a rounding beyond.
+    np.testing.assert_array_equal(made.at(15.0)[0], [1, 1, 1])
+    np.testing.assert_array_equal(made.at(16.0)[0], [1, 1, 1])
+    assert made.time_at(15.0) == pytest.approx(1.0)
+    assert made.time_at(3.5) == pytest.approx(0.15)
+    np.testing.assert_allclose(made.normal_at(99.0), [0.0, 0.0, 1.0])
+
+
+def test_as_many_set_points_as_may_be_are_planned_and_no_more(monkeypatch):
+    monkeypatch.setattr(planning, "LONGEST", 500)
+    assert len(plan(stroke())) == 501
+    with pytest.raises(InputError, match="over 500 set-points"):
+        plan(stroke(duration=10.02))
+
+
+def test_an_attitude_that_passes_half_a_turn_is_resampled_without_a_jump():
+    """A pen that points down, rx = π, is half a turn: leaning to and fro it passes that."""
+    t = np.arange(21) * 0.1
+    lean = 0.4 * minimum_jerk(t / 2.0) - 0.2
+    angles = np.column_stack([np.pi + lean, 0.0 * t, 0.3 * lean])
+    source = replace(stroke(duration=2.0, rate=10.0), rotation=rotations.from_euler(angles))
+    made = plan(source)
+    at = np.interp(made.t, np.linspace(0.0, 2.0, 2001), 0.4 * minimum_jerk(np.linspace(0, 1, 2001)))
+    angles = np.column_stack([np.pi + at - 0.2, 0.0 * at, 0.3 * (at - 0.2)])
+    off = rotations.log(rotations.from_euler(angles) @ np.swapaxes(made.rotation, -1, -2))
+    assert np.abs(off).max() < 2e-3
+    velocity = made.derivatives()[0][:, 1]
+    assert np.linalg.norm(velocity, axis=1).max() < 1.1 * 1.875 * 0.42 / 2.0
+    # Between two set-points too.
+    for index in (47.5, 50.25, 53.75):
+        turn = rotations.log(made.at(index)[1] @ made.rotation[int(index)].T)
+        assert np.linalg.norm(turn) < 0.02

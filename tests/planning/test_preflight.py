@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dmpcli.errors import RefusedError
-from dmpcli.planning import preflight
+from dmpcli.planning import preflight, transfers
 from dmpcli.planning.plan import PlannedStroke
 from tests.control.streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 from tests.minimum_jerk import minimum_jerk
@@ -171,3 +171,96 @@ def test_the_peak_of_a_stroke_is_told_by_its_own_time_and_row_whatever_leads_to_
     bends = by_name(preflight.within_limits(plan(straight), straight, WIDE))["acceleration"]
     assert min(abs(bends.t - at) for at in (2.113, 7.887)) < 0.05
     assert bends.value == pytest.approx(5.7735 * LENGTH / 100.0, rel=1e-2)
+
+
+def test_a_check_says_quantity_place_limit_and_remedy():
+    at = preflight.Check("speed", 260.0, 250.0, "mm/s", 1.5, 76, "slow it down")
+    assert str(at) == (
+        "speed 260 mm/s at t = 1.500 s (row 76) is over the limit of 250 mm/s; slow it down"
+    )
+    way = preflight.Check("jerk", 9.0, 8.0, "mm/s³", None, None, "raise it", "in the transfer")
+    assert str(way) == "jerk 9 mm/s³ in the transfer is over the limit of 8 mm/s³; raise it"
+    bare = preflight.Check("angle", 1.0, 0.5, "rad", None, None, "turn")
+    assert str(bare) == "angle 1 rad is over the limit of 0.5 rad; turn"
+    assert preflight.Check("speed", 250.0, 250.0, "mm/s", None, None, "").passed
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "order"),
+    [("speed", "speed", 1), ("acceleration", "acceleration", 2), ("jerk", "jerk", 3)],
+)
+def test_the_speed_that_is_advised_goes_with_the_root_of_what_is_too_much(name, option, order):
+    source = stroke()
+    value = by_name(preflight.within_limits(plan(source), source, WIDE))[name].value
+    limits = dataclasses.replace(WIDE, **{name: value / 3.0})
+    check = by_name(preflight.within_limits(plan(source), source, limits))[name]
+    factor = np.floor(100.0 * 3.0 ** (-1.0 / order)) / 100.0
+    assert check.remedy == (
+        f"slow it down to {factor:g} times its speed with --speed, or raise --max-{option} if the "
+        "arm may"
+    )
+    # A hundredth of its speed is the least that is advised, and a limit that is kept advises none.
+    hopeless = dataclasses.replace(WIDE, **{name: value / 1e7})
+    assert by_name(preflight.within_limits(plan(source), source, hopeless))[name].remedy == (
+        f"raise --max-{option} if the arm may"
+    )
+
+
+def test_a_way_that_breaks_a_limit_is_told_by_its_name_and_has_no_row():
+    source = stroke()
+    away = START + [0.0, 60.0, 0.0]
+    made = plan(source, start=(away, PEN_DOWN), approach=100.0)
+    limits = dataclasses.replace(WIDE, speed=50.0)
+    check = by_name(preflight.within_limits(made, source, limits))["speed"]
+    assert (check.t, check.row, check.place) == (None, None, "in the approach")
+    assert check.value == pytest.approx(100.0, rel=2e-2)
+    # Within its limit it is the stroke's own peak that is told.
+    check = by_name(preflight.within_limits(made, source, WIDE))["speed"]
+    assert check.value < 50.0
+    assert check.place == ""
+
+
+@pytest.mark.parametrize(("axis", "side"), [(a, s) for a in range(3) for s in (0, 1)])
+def test_each_side_of_the_workspace_is_kept_to_the_last_bit(axis, side):
+    source = stroke()
+    made = plan(source)
+    box = np.column_stack([made.position.min(axis=0), made.position.max(axis=0)])
+    limits = dataclasses.replace(WIDE, workspace=tuple(box.ravel()))
+    assert failed(preflight.within_limits(made, source, limits)) == []
+    box[axis, side] += (0.5, -0.5)[side]
+    limits = dataclasses.replace(WIDE, workspace=tuple(box.ravel()))
+    [bad] = [c for c in preflight.within_limits(made, source, limits) if not c.passed]
+    assert bad.quantity == f"distance outside the workspace in {'xyz'[axis]}"
+    assert bad.value == pytest.approx(0.5)
+    row = (np.argmin, np.argmax)[side](made.position[:, axis])
+    assert bad.row == row + 1
+    assert bad.t == pytest.approx(0.02 * row)
+    assert "clearance" not in bad.remedy
+
+
+def test_a_transfer_that_leaves_the_workspace_may_be_lowered():
+    source = stroke(normal=(0.0, 0.0, 1.0))
+    ways = transfers.TransferOptions(20.0, 100.0, 50.0, 20.0)
+    [made] = transfers.plans([source], 0.02, 1.0, WIDE, (START, PEN_DOWN), True, ways)
+    box = (-900.0, 900.0, -900.0, 900.0, -100.0, START[2] + 15.0)
+    checks = preflight.within_limits(made, source, dataclasses.replace(WIDE, workspace=box))
+    [bad] = [c for c in checks if not c.passed]
+    assert (bad.quantity, bad.place) == ("distance outside the workspace in z", "in the retract")
+    assert bad.value == pytest.approx(5.0)
+    assert bad.remedy.startswith("move the stroke, lower --clearance, or widen --workspace (z -100")
+
+
+def test_two_samples_tell_their_straight_velocity_and_three_a_parabolas():
+    t = np.array([1.0, 1.5])
+    short = PlannedStroke("0", t, np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]), first_row=9)
+    start, end = preflight.at_rest(short, 1.0, 0.02, WIDE)
+    assert start.value == pytest.approx(10.0)
+    assert end.value == pytest.approx(10.0)
+    assert (start.t, start.row, end.t, end.row) == (0.0, 9, 0.5, 10)
+    assert "--ease-in S, which brings it from rest" in start.remedy
+    assert "--ease-out S, which brings it to rest" in end.remedy
+    uneven = np.array([0.0, 0.1, 0.4])
+    y = (2.0 * uneven + 3.0 * uneven**2)[:, None] * [1.0, 0.0, 0.0]
+    start, end = preflight.at_rest(PlannedStroke("0", uneven, y), 1.0, 0.02, WIDE)
+    assert start.value == pytest.approx(2.0)
+    assert end.value == pytest.approx(2.0 + 6.0 * 0.4)

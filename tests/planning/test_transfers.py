@@ -257,3 +257,104 @@ def test_any_tour_is_continuous_keeps_every_limit_and_stays_clear_of_the_work(en
     assert away[phases == "transfer"].min(initial=np.inf) >= 20.0 - 2e-3
     assert away.min() >= -1e-6
     np.testing.assert_allclose(away[phases == "stroke"], 0.0, atol=1e-6)
+
+
+def test_an_arm_that_stands_higher_crosses_where_it_is():
+    start = (np.array([30.0, 80.0, 55.0]), PEN_DOWN)
+    position, _, phases = whole(toured(LEVEL[:1], start, near=False))
+    crossing = position[phases == "transfer"]
+    assert crossing[:, 2].max() == pytest.approx(55.0)
+    across = crossing[np.linalg.norm(np.diff(crossing[:, :2], axis=0, prepend=0.0), axis=1) > 0.01]
+    np.testing.assert_allclose(across[1:, 2], 55.0, atol=1e-6)
+    low, _, phases = whole(toured(LEVEL[:1], (start[0] * [1, 1, 0], PEN_DOWN), near=False))
+    assert low[phases == "transfer"][:, 2].max() == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_only_the_way_to_the_first_stroke_is_as_slow_as_asked(near):
+    start = (np.array([0.5, 0.0, 0.0]) if near else np.array([0.0, 90.0, 0.0]), PEN_DOWN)
+    plans = toured(LEVEL, start, near=near, approach=6.0)
+    onto = plans[0].position[: plans[0].lead + 1]
+    assert speed_of(onto).max() <= 6.0
+    assert near or speed_of(onto).max() > 5.9
+    assert speed_of(plans[1].position[: plans[1].lead]).max() > 50.0
+    # Faster than the others it is not made by it.
+    usual = toured(LEVEL, start, near=near)
+    quick = toured(LEVEL, start, near=near, approach=500.0)
+    np.testing.assert_array_equal(usual[0].position, quick[0].position)
+
+
+def test_at_half_the_speed_the_ways_are_slower_and_at_twice_they_are_not_quicker():
+    tops = {}
+    for speed in (0.5, 1.0, 2.0):
+        plans = toured(LEVEL, speed=speed)
+        tops[speed] = [speed_of(p.position[: p.lead]).max() for p in plans[1:]]
+    np.testing.assert_allclose(tops[0.5], np.array(tops[1.0]) / 2.0, rtol=0.02)
+    assert tops[2.0] == pytest.approx(tops[1.0])
+
+
+def test_a_coupling_makes_the_retract_slower_by_what_it_may_add():
+    def lasting(ways):
+        made = toured(LEVEL[:1], ways=ways)[0]
+        return len(made) - 1 - made.last - 2 * ways.settling
+
+    plain, pressed = lasting(WAYS), lasting(replace(WAYS, spare=15.0))
+    assert (plain, pressed) == (
+        pytest.approx(1.875 * 20.0 / 50.0 / PERIOD, abs=2),
+        pytest.approx(1.875 * 35.0 / 50.0 / PERIOD, abs=2),
+    )
+
+
+def test_a_single_stroke_may_end_where_it_ends():
+    [made] = transfers.plans(
+        LEVEL[:1], PERIOD, 1.0, WIDE, (np.array([0.0, 90.0, 0.0]), PEN_DOWN), False, WAYS, None,
+        leave=False,
+    )  # fmt: skip
+    assert made.last == len(made) - 1
+    assert [phase for phase, _ in made.legs] == ["transfer"] * 2 + ["approach", "stroke"]
+    # Where only its start counts, an end that faces elsewhere is no hindrance.
+    n = np.tile([0.0, 0.0, 1.0], (len(LEVEL[0].t), 1))
+    n[-1] = [0.0, 0.0, -1.0]
+    bent = replace(LEVEL[0], normal=n)
+    transfers.height([bent], PEN_DOWN, 20.0, (0,))
+    with pytest.raises(RefusedError, match="stroke a"):
+        transfers.height([bent], PEN_DOWN, 20.0)
+
+
+@pytest.mark.parametrize(("lean", "along"), [(59.9, "base z"), (60.1, "the normals")])
+def test_height_is_along_base_z_where_it_leads_away_from_all_faces_by_30_degrees(lean, along):
+    n = Rotation.from_euler("y", lean, degrees=True).as_matrix() @ [0.0, 0.0, 1.0]
+    found = transfers.height([line("a", (0, 0, 0), (0, 50, 0), n)], PEN_DOWN, 20.0)
+    np.testing.assert_allclose(found.up, [0, 0, 1] if along == "base z" else n, atol=1e-12)
+    assert found.level == pytest.approx(20.0)
+
+
+def test_the_stroke_that_faces_furthest_away_is_named():
+    faces = [line("a", (0, 0, 0), (50, 0, 0)), line("b", (0, 9, 0), (50, 9, 0))]
+    faces += [line("side", (0, 0, 0), (0, 50, 0), (1, 0, -0.6))]
+    with pytest.raises(RefusedError, match="stroke side: faces another side"):
+        transfers.height(faces, PEN_DOWN, 20.0)
+
+
+def test_a_tour_of_too_many_set_points_is_refused_by_the_stroke_that_is_too_much(monkeypatch):
+    total = np.cumsum([len(p) for p in toured(LEVEL)])
+    monkeypatch.setattr(transfers, "LONGEST_TOUR", int(total[1]))
+    with pytest.raises(InputError, match="up to c take over"):
+        toured(LEVEL)
+    monkeypatch.setattr(transfers, "LONGEST_TOUR", int(total[1]) - 1)
+    with pytest.raises(InputError, match="up to b take over"):
+        toured(LEVEL)
+    monkeypatch.setattr(transfers, "LONGEST_TOUR", int(total[2]))
+    assert len(toured(LEVEL)) == 3
+
+
+def test_a_stroke_without_normals_is_left_back_along_the_tool():
+    held = Rotation.from_euler("x", 170.0, degrees=True).as_matrix()
+    bare = replace(LEVEL[1], normal=None)
+    np.testing.assert_array_equal(transfers.off(bare, held, 0), -bare.rotation[0][:, 2])
+    np.testing.assert_array_equal(transfers.off(bare, held, -1), -bare.rotation[-1][:, 2])
+    none = replace(bare, rotation=None)
+    np.testing.assert_allclose(transfers.off(none, held, 0), -held[:, 2])
+    over = transfers.Height(np.array([0.0, 0.6, 0.8]), 12.0)
+    np.testing.assert_allclose(over.over(np.array([5.0, 0.0, 0.0])), [5.0, 7.2, 9.6])
+    np.testing.assert_allclose(over.over(np.array([5.0, 6.0, 8.0]), 4.0), [5.0, 2.4, 3.2])
