@@ -260,7 +260,8 @@ def _ways_about(
     def free(rows: Integers, ways: Integers, shape: Floats) -> Booleans:
         u, v = shape[:, :1], shape[:, 1:]
         points = u * along[rows, ways, None] + v * across[rows, ways, None]
-        return whole.holds(number, points + feet[rows, None], size)[0].all(axis=-1)
+        held = whole.holds(number, points + feet[rows, None], size)[0]
+        return np.asarray(held.all(axis=-1))
 
     for stretch in _STRETCHES if stroke.length else _STRETCHES[:1]:
         path = stroke.path * [stretch, 1.0]
