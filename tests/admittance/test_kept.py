@@ -175,7 +175,7 @@ def loops_of_any_delay():
         ):
             found += [gains, force_stability.loop_matrix(gains, 3.0, delay)]
             found += [force_stability.growth(gains, 3.0, delay)]
-            found += [force_stability.largest_stiffness(gains, delay)]
+            found += [force_stability.steadied(gains, 30.0, delay, 2e-4)]
         found.append(force_stability.smallest_damping(3.0, delay, 0.02, 0.4))
     state, gains = force_law.LawState(0.1, 2.0, 0.05), force_law.by_rule(2.0, 0.06, 0.02)
     for error, fastest in ((9.0, 1.0), (-9.0, 1.0), (0.3, 50.0), (2.0, 0.5)):
