@@ -69,3 +69,15 @@ def test_on_a_stiff_plate_behind_a_lagging_servo_the_chatter_is_ended():
     last = columns["t"] > columns["t"][-1] - 2.5
     first = (columns["t"] > recorder.chatter.alarms[0]["t"] - 1.0) & ~last
     assert np.ptp(columns["fz"][last]) < 0.5 * np.ptp(columns["fz"][first])
+
+
+def test_a_tool_that_leans_by_just_60_degrees_from_an_axis_takes_part_in_it():
+    law = drag_settings().law
+    for along, parts in (
+        (0.5, [FACTOR, 1.0, FACTOR]),
+        (np.nextafter(0.5, 0.0), [1.0, 1.0, FACTOR]),
+    ):
+        made = damped(law, np.array([-along, 0.0, 0.9]))
+        np.testing.assert_allclose(made.damping[:3] / law.damping[:3], parts)
+        np.testing.assert_array_equal(made.stiffness, law.stiffness)
+        assert made.period == law.period

@@ -292,9 +292,9 @@ def test_a_wall_is_told_beside_the_force_that_no_loop_of_this_delay_would_have_s
     assert supervisor.urgent
 
 
-def at_work(**policy):
-    """A supervisor that draws at 5 N on 2 N/mm, told forces directly."""
-    rig = Rig(Plant(2.0, noise=0.0), **policy).land()
+def at_work(setpoint=5.0, **policy):
+    """A supervisor that draws on 2 N/mm, told forces directly."""
+    rig = Rig(Plant(2.0, noise=0.0), setpoint, **policy).land()
     assert rig.supervisor.state == "drawing"
     return rig.supervisor, rig.t
 
@@ -437,3 +437,25 @@ def test_after_a_stroke_it_is_lifted_by_the_reach_above_where_it_would_be_unpres
     assert [event.state for event in supervisor.events].count("retreating") == 1
     supervisor.leaves(t)
     assert [event.state for event in supervisor.events].count("retreating") == 1
+
+
+def swung(spacing, size=2.0, wanted=5.0):
+    """Forces that alternate by a size about the set-point: whether the loop is said to swing."""
+    supervisor, t = at_work(wanted, whole_delay=0.08, limit=9.0)
+    for k in range(1, 14):
+        supervisor.step(t + spacing * k, wanted + 0.5 * size * (-1) ** k, 0.0, wanted)
+    return "oscillating" in {event.state for event in supervisor.events}
+
+
+def test_six_alternations_within_twenty_delays_are_a_swing():
+    """Of a loop of 0.08 s and a period of 0.02 s: within 2 s."""
+    assert swung(0.39)
+    assert not swung(0.41)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "size", "swings"),
+    [(5.0, 1.52, True), (5.0, 1.48, False), (1.5, 0.52, True), (1.5, 0.48, False)],
+)
+def test_a_swing_is_three_tenths_of_the_set_point_or_half_a_newton(wanted, size, swings):
+    assert swung(0.2, size, wanted) is swings
