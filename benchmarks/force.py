@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.force [TABLE ...] [--seeds N] [--so-far]``; tables: ``surfaces`` (that of
 ``make reproduce-force``), ``stiffness``, ``landing``, ``features``, ``zero``, ``profile``,
-``arms``; all without a name. Apart from them ``stability``, a map as SVG and PNG, and ``work``,
-what the coupling costs in a cycle.
+``arms``, ``normals``, ``reports``; all without a name. Apart from them ``stability``, a map as SVG
+and PNG, and ``work``, what the coupling costs in a cycle.
 
 The stroke is the paper's, 109 mm with a wave of 50 mm, in 12 s from rest to rest at 50 Hz, with
 5 N; an EC66 with joints that lag by 25 ms, a pen of 2 N/mm, friction 0.2, noise 0.05 N. What is
@@ -29,9 +29,11 @@ import numpy as np
 
 from benchmarks import force_runs, force_stability, force_work
 from benchmarks.force_cases import PEN, ROOT, TABLES, Case
+from dmpcli.control.execution import DRIFTED
 
 KEPT = ROOT / "out" / "force-runs.jsonl"
 _SAID = 72  # of why a run ended, characters
+POSITION_TOO = ("surfaces", "stiffness", "landing", "features")
 HEAD = (
     "contact, % | mean off, N | RMS, N | peak, N | landing, N | wave, mm | off, mm | k̂ off, % "
     "| seeds | ended"
@@ -96,8 +98,9 @@ def rows(table: str) -> list[Case]:
     found = []
     for case in TABLES[table]():
         found.append(case)
-        if table == "surfaces":
-            found.append(Case("… position only", case.plan, case.bench, coupled=False))
+        if table in POSITION_TOO:
+            brief = case.brief
+            found.append(Case("… position only", case.plan, case.bench, coupled=False, brief=brief))
     return found
 
 
@@ -154,11 +157,22 @@ def more(results: list[dict[str, Any]]) -> list[str]:
         return [one[key] for one in results if key in one]
 
     said = []
-    if of("gap"):
+    if of("after"):
         said.append(
-            f"without contact {1e3 * max(of('gap')):.0f} ms, then {100 * min(of('after')):.2f} % "
-            f"with at most {max(of('peak_after')):.2f} N; along the normal {max(of('along')):.1f} N"
+            f"without contact for {1e3 * max(of('gap')):.0f} ms, of which no loop answers within "
+            f"{1e3 * max(of('answers')):.0f}; in contact on {100 * min(of('after')):.2f} % from "
+            f"then to the end, {100 * min(of('whole')):.2f} % from the edge on, with at most "
+            f"{max(of('peak_after')):.2f} N; on the edge {max(of('peak_edge')):.2f} N, along the "
+            f"pen {max(of('along')):.1f} N"
         )
+    if of("leans"):
+        said.append(
+            f"normal felt {max(of('leans')):.1f}° off the true one in the mean, "
+            f"{max(of('leans_p95')):.1f}° (95 %), friction {min(of('friction')):.2f} to "
+            f"{max(of('friction')):.2f}"
+        )
+    if max(of("zero_drift"), default=0.0) > DRIFTED:
+        said.append(f"zero moved by {max(of('zero_drift')):.2f} N (told)")
     if of("unavoidable"):
         told = [one["wall"]["unavoidable"] for one in results if "wall" in one]
         ratio = max(one["across"] / one["unavoidable"] for one in results if "unavoidable" in one)

@@ -35,6 +35,10 @@ class Case:
     arm : {'ec66', 'ur5e'}
     brief : bool
         Whether the goal is ten times as near, in 4 s and ways: the landing is what counts.
+    leans : bool
+        Whether the normal that was felt is held against the true one.
+    force : float
+        Set-point of a stroke that presses evenly, N.
     """
 
     name: str
@@ -45,6 +49,8 @@ class Case:
     taught: bool = False
     arm: str = "ec66"
     brief: bool = False
+    leans: bool = False
+    force: float = FORCE
 
 
 def said_of(case: Case, seed: int) -> dict[str, str]:
@@ -138,6 +144,49 @@ def arms() -> list[Case]:
     ]
 
 
+def normals() -> list[Case]:
+    """Surfaces that lean from the plan: the force held along the planned and along their normal."""
+    leaning = [
+        ("plane, 3° along the stroke", "plane", displaced(0.0, 3.0)),
+        ("plane, 5° along the stroke", "plane", displaced(0.0, 5.0)),
+        ("plane, -5° along the stroke", "plane", displaced(0.0, -5.0)),
+        ("plane, 5° across it", "plane", displaced(0.0, 5.0, about="0")),
+        ("cylinder R 60 as planned", "cylinder", displaced(0.0, about="0")),
+        ("cylinder R 60, 5 mm and 3° off", "cylinder", displaced(5.0, 3.0, about="0")),
+    ]
+    return [
+        Case(f"{name}{said}", plan, bench, settings=settings, leans=True)
+        for name, plan, bench in leaning
+        for said, settings in (("", {}), ("; along its normal", {"normal_from_force": True}))
+    ]
+
+
+def reports() -> list[Case]:
+    """What people have met, in numbers of the bench; docs/force.md has who and where."""
+    rigid, steep = {"stiffness": "60"}, {"along": "180", "far": "10"}
+    bulge = displaced(0.0, about="0", radius="90", stiffness="5")
+    drifted = {"bias_y": "1.32", "bias_z": "4.09"}
+    return [
+        Case("bounces on a rigid body, 10 N", bench=displaced(-2.0) | rigid, force=10.0),
+        Case("bounces on hard ground, 2 cycles late", bench=rigid | {"delay": "0.04"}),
+        Case("begins in contact, 8.9 N/mm", bench=displaced(5.0, stiffness="8.9"), force=10.0),
+        Case("overshoots as it begins to slide", bench=displaced(0.0), force=10.0),
+        Case("zero 4 N off after five minutes", bench=drifted),
+        Case("zero 1.3 N off across", bench={"bias_y": "1.32"}),
+        Case("zero drifts by 20 mN/s", bench={"drift_z": "0.02"}),
+        Case("25 N on a slight bulge, friction 0.2", "cylinder", bulge, force=25.0),
+        Case(
+            "25 N on a slight bulge, friction 0.4",
+            "cylinder",
+            bulge | {"friction": "0.4"},
+            force=25.0,
+        ),
+        Case("4 N, slides off the box", bench={"surface": "edge"} | steep, force=4.0),
+        Case("UR5e, 1 N", bench=displaced(1.0), arm="ur5e", force=1.0),
+        Case("UR5e, 10 N", bench=displaced(1.0), arm="ur5e", force=10.0),
+    ]
+
+
 TABLES = {
     "surfaces": surfaces,
     "stiffness": stiffness,
@@ -146,4 +195,6 @@ TABLES = {
     "zero": zero,
     "profile": profile,
     "arms": arms,
+    "normals": normals,
+    "reports": reports,
 }

@@ -15,7 +15,6 @@ from scipy.spatial import cKDTree
 
 import dmpcli
 from benchmarks.force_cases import (
-    FORCE,
     GOAL,
     LAG,
     MIDDLE,
@@ -29,9 +28,9 @@ from benchmarks.force_cases import (
     Case,
     said_of,
 )
-from dmpcli.arrays import AnyArray, Floats
+from dmpcli.arrays import Floats
 from dmpcli.bench import options
-from dmpcli.bench.workpiece import Flat, Round
+from dmpcli.bench.workpiece import Flat, Round, Step
 from dmpcli.bench.world import World
 from dmpcli.control.execution import SENSOR_RATE
 from dmpcli.dmp import reference_paths
@@ -94,10 +93,10 @@ def run(case: Case, seed: int) -> dict[str, Any]:
     logging.disable(logging.CRITICAL)
     said = said_of(case, seed)
     pen = float(said.get("stiffness", PEN))
-    drawn = planned(case.plan, 0.0 if case.coupled else -FORCE / pen, case.taught, case.brief)
-    sensor = {"sensor": f"bench://{case.arm}", "coupling": "force"}
+    drawn = planned(case.plan, 0.0 if case.coupled else -case.force / pen, case.taught, case.brief)
+    sensor: dict[str, Any] = {"sensor": f"bench://{case.arm}", "coupling": "force"}
     if not case.taught:
-        sensor["force_setpoint"] = FORCE
+        sensor["force_setpoint"] = case.force
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()):
         truth, out = Path(folder) / "truth.parquet", Path(folder) / "run.parquet"
         url = f"bench://{case.arm}?" + "&".join(f"{key}={value}" for key, value in said.items())
@@ -141,9 +140,12 @@ def measured(
         "states": [one["state"] for one in facts.get("contact_events", [])],
     }
     told = facts.get("contact", {})
-    found |= {key: told[key] for key in ("stiffness", "delay", "wall") if key in told}
+    kept = ("stiffness", "delay", "wall", "zero_drift")
+    found |= {key: told[key] for key in kept if key in told}
     if case.bench.get("surface") in ("wall", "slot"):
         found["unavoidable"] = unavoidable(case, said, true)
+    if case.leans and "friction" in told:
+        found |= leaning(case, said, log) | {"friction": told["friction"]}
     # What a set-point says shows a look-ahead later.
     step = true["t"][1] - true["t"][0]
     late = round((float(said.get("delay", 0.0)) + LAG + PERIOD) / step)
@@ -153,7 +155,7 @@ def measured(
     on[rows[rows < len(on)]] = True
     if not on.any():
         return found
-    felt, asked = push[on], FORCE
+    felt, asked = push[on], case.force
     if case.taught:
         asked = np.asarray(log.columns["fn"])[cycle[np.flatnonzero(on) - late]]
     found |= {
@@ -162,9 +164,9 @@ def measured(
         "rms": float(np.sqrt(np.mean((felt - asked) ** 2))),
         "peak": float(felt.max()),
     }
-    if case.coupled:
-        found |= regained(felt, np.asarray(log.columns["contact"])[cycle[on]], step)
     tip = np.column_stack([true[key] for key in "xyz"])[on]
+    if said.get("surface") == "step":
+        found |= beyond(case, said, felt, tip, step)
     wanted = onto(case, said, drawn)
     if wanted is not None and not case.brief:
         tree = cKDTree(finely(wanted))
@@ -179,28 +181,58 @@ def measured(
     return found
 
 
-def regained(felt: Floats, state: AnyArray, step: float) -> dict[str, float]:
-    """How long a contact that was lost was gone, s, and what share of the rest it then held.
+def leaning(case: Case, said: dict[str, str], log: record.Record) -> dict[str, float]:
+    """By how much the normal that was felt leans from the true one under the tool, degrees."""
+    workpiece = options.parameters(case.arm, said).workpiece
+    assert isinstance(workpiece, Flat | Round)
+    felt, at = (
+        np.column_stack([log.columns[name] for name in names])
+        for names in (schemas.FELT_NORMAL, schemas.POSITION)
+    )
+    known = np.isfinite(felt).all(axis=1) & (np.asarray(log.columns["phase"]) == "stroke")
+    true = workpiece.surface.closest(at[known]).normal
+    off = np.degrees(np.arccos(np.clip(np.sum(felt[known] * true, axis=1), -1.0, 1.0)))
+    return {"leans": float(off.mean()), "leans_p95": float(np.percentile(off, 95.0))}
+
+
+def beyond(
+    case: Case, said: dict[str, str], felt: Floats, tip: Floats, step: float
+) -> dict[str, float]:
+    """Measure what comes after a step down.
+
+    From when the ball's middle is past the edge by its radius it cannot lie on it any more; no loop
+    answers before its reaction time has passed: a reading, a period, and the arm's look-ahead.
+    *After* is from then on, *whole* from the edge on, to the stroke's end.
 
     Parameters
     ----------
+    case : Case
+    said : dict
+        Options of the bench.
     felt : array, shape (n,)
         N.
-    state : array of str, shape (n,)
-        Of the supervisor.
+    tip : array, shape (n, 3)
+        mm.
     step : float
-        s.
+        Of the physics, s.
     """
-    lost = (state == "lost") | (state == "seeking")
-    if not lost.any():
+    parameters = options.parameters(case.arm, said)
+    frame, piece, pen = parameters.workpiece.pose, parameters.workpiece, parameters.pen
+    assert isinstance(piece, Step)
+    along = (tip - frame.position) @ frame.rotation[:, 0] - piece.at
+    if not (along > pen.radius).any():
         return {}
-    again = np.flatnonzero((state == "drawing") & (np.arange(len(state)) > np.argmax(lost)))
-    if not len(again):
-        return {}
+    past, edge = int(np.argmax(along > pen.radius)), int(np.argmax(along > -pen.radius))
+    loose = np.flatnonzero(felt[edge:] <= 0.0)
+    again = edge + int(loose[-1]) + 1 if len(loose) else past
+    answers = reaction(said)
     return {
-        "gap": float((felt[: again[0]] <= 0.0).sum() * step),
-        "after": float((felt[again[0] :] > 0.0).mean()),
-        "peak_after": float(felt[again[0] :].max()),
+        "gap": float(len(loose) * step),
+        "answers": answers,
+        "after": float((felt[past + round(answers / step) :] > 0.0).mean()),
+        "whole": float((felt[past:] > 0.0).mean()),
+        "peak_edge": float(felt[edge:again].max(initial=0.0)),
+        "peak_after": float(felt[again:].max(initial=0.0)),
     }
 
 
@@ -223,8 +255,12 @@ def unavoidable(case: Case, said: dict[str, str], true: dict[str, Floats]) -> fl
     wall /= np.linalg.norm(wall)
     at = dict(zip("xyz", map(repr, tip[hit].tolist()), strict=True))
     compliance = World(options.parameters(case.arm, said | at)).compliance
-    reaction = 1.0 / SENSOR_RATE + PERIOD + PERIOD + LAG + float(said.get("delay", 0.0))
-    return abs(float(velocity @ wall)) * reaction / float(wall @ compliance @ wall)
+    return abs(float(velocity @ wall)) * reaction(said) / float(wall @ compliance @ wall)
+
+
+def reaction(said: dict[str, str]) -> float:
+    """From what is felt to what the arm does about it, s: a reading, a period, its look-ahead."""
+    return 1.0 / SENSOR_RATE + PERIOD + PERIOD + LAG + float(said.get("delay", 0.0))
 
 
 def finely(path: Floats) -> Floats:
@@ -245,7 +281,7 @@ def onto(case: Case, said: dict[str, str], drawn: dmpcli.Trajectory) -> Floats |
     surface, point = workpiece.surface, drawn.position.copy()
     normal = -drawn.rotation[:, :, 2]  # the pen stands along the planned normal
     if not case.coupled:
-        point = point + FORCE / float(said.get("stiffness", PEN)) * normal
+        point = point + case.force / float(said.get("stiffness", PEN)) * normal
     for _ in range(20):
         hit = surface.closest(point)
         off = np.sum((point - hit.position) * hit.normal, axis=1)

@@ -16,6 +16,7 @@ import signal
 import struct
 import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 EVERY = 0.5
 """s between two pictures."""
+
+_GLANCE = 0.0005
+"""s between two looks for a new row."""
 
 SIZE = 4096
 
@@ -173,6 +177,12 @@ class SharedRow:
             self._words = tuple(words) if isinstance(words, tuple) else list(words)
         self._number[0] = self._count
 
+    def await_next(self) -> None:
+        """Wait for the next row, two periods at most; after it the loop sleeps for most of one."""
+        number, until = int(self._number[0]), time.monotonic() + 2.0 * self._view.period
+        while int(self._number[0]) == number and time.monotonic() < until:
+            time.sleep(_GLANCE)
+
     def read(self) -> dict[str, Any] | None:
         """Return the picture of what stands there; None where nothing does, or it is written."""
         number = int(self._number[0])
@@ -198,11 +208,13 @@ def table(seen: Mapping[str, Any]) -> "Table":
     """
     from rich.progress_bar import ProgressBar
     from rich.table import Table
+    from rich.text import Text
 
     shown = Table(box=None, show_header=False, pad_edge=False)
     shown.add_column(style="bold")
     shown.add_column(width=60)
-    shown.add_row(seen["title"], f"{seen['t']:.1f} s   {seen.get('state', '')}")
+    # As texts: what stands in brackets in the name of a stroke is no markup.
+    shown.add_row(seen["title"], Text(f"{seen['t']:.1f} s   {seen.get('state', '')}"))
     if seen.get("share") is not None:
         shown.add_row(f"{100 * seen['share']:3.0f} %", ProgressBar(1.0, seen["share"], width=50))
     if "pose" in seen:
@@ -214,12 +226,12 @@ def table(seen: Mapping[str, Any]) -> "Table":
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         shown.add_row("force", f"{fx:7.2f} {fy:7.2f} {fz:7.2f} N   |F| {size:.2f} N")
     if seen.get("contact"):
-        shown.add_row("contact", seen["contact"])
+        shown.add_row("contact", Text(seen["contact"]))
     if math.isfinite(seen.get("late", math.nan)):
         late, worst = seen["late"], seen["worst"]
         shown.add_row("late", f"{late:.2f} ms, worst so far {worst:.2f} ms")
     if seen.get("reason"):
-        shown.add_row("ended", seen["reason"])
+        shown.add_row("ended", Text(seen["reason"]))
     return shown
 
 
@@ -241,7 +253,7 @@ def show(fd: int, view: RowView) -> None:
                 if line[0] == END:
                     reason.append(said)
                 else:
-                    live.console.print(said, markup=False, highlight=False)
+                    live.console.print(said, markup=False, highlight=False, emoji=False)
             ended.set()
 
         threading.Thread(target=listen, daemon=True).start()
@@ -250,6 +262,9 @@ def show(fd: int, view: RowView) -> None:
         over = False
         while not over:
             over = ended.wait(EVERY)
+            if not over:
+                # A picture takes 3 ms: it begins as the loop falls asleep.
+                row.await_next()
             seen = row.read()
             if seen is not None:
                 live.update(table(seen | {"reason": "".join(reason)}), refresh=True)

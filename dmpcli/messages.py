@@ -256,11 +256,11 @@ def tell_as(level: int, message: str) -> None:
 class Advance(Protocol):
     """Told how much is done."""
 
-    def __call__(self, steps: int, failed: int = 0) -> None:
-        """So many steps since the last call, of which so many failed."""
+    def __call__(self, steps: int, failed: int = 0, left_out: int = 0) -> None:
+        """So many steps since the last call, of which so many failed; some are not to be done."""
 
 
-def _unseen(steps: int, failed: int = 0) -> None:
+def _unseen(steps: int, failed: int = 0, left_out: int = 0) -> None:
     """Nobody looks on."""
 
 
@@ -300,13 +300,13 @@ def progress(label: str, total: int) -> Iterator[Advance]:
         task = bar.add_task(label, total=total, rate="", failures="")
         failures = 0
 
-        def advance(steps: int, failed: int = 0) -> None:
-            nonlocal failures
-            failures += failed
+        def advance(steps: int, failed: int = 0, left_out: int = 0) -> None:
+            nonlocal failures, total
+            failures, total = failures + failed, total - left_out
             speed = bar.tasks[0].speed
             rate = "" if speed is None else f"{speed:,.3g}/s" if speed < 1e3 else f"{speed:,.0f}/s"
             said = f"{failures} failed" if failures else ""
-            bar.update(task, advance=steps, rate=rate, failures=said)
+            bar.update(task, total=total, advance=steps, rate=rate, failures=said)
 
         yield advance
 

@@ -8,7 +8,8 @@ stiffness k, felt a delay L later, it is a proportional-integral control of an i
 - the integral takes away the error ``D·v`` that a surface leaves which departs from the plan at v;
 - a sensor feels the inertia of the tool that it carries, m·ë, too. At a frequency above √(k/m) that
   is more than the contact, and of the other sign: a soft contact of a heavy tool swings unless
-  ``D`` is some 0.6·m/T, at the servos' usual lags. The rule takes ``D = 0.75·m/T`` at the least.
+  ``D`` is some 0.6·m/T, at the servos' usual lags. The rule takes ``D = 0.75·m/T`` at the least, T
+  no longer than such a lag.
 
 Plain scalars: this runs once a cycle.
 """
@@ -19,8 +20,8 @@ from dataclasses import dataclass, replace
 DAMPING_SHARE, INTEGRAL_DELAYS = 0.9, 4.0
 """Of the rule: damping by stiffness times delay, and the integral's time by the delay."""
 
-INERTIA_SHARE, LEAST_INERTIA_SHARE = 0.75, 0.6
-"""Damping by the tool's mass over the period: of the rule, and where a loop begins to swing."""
+INERTIA_SHARE, INERTIA_PERIOD = 0.75, 0.025
+"""Of the rule: damping by the tool's mass over the period, and the longest of these, s."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,8 @@ def by_rule(
     """
     damping = DAMPING_SHARE * stiffness * delay
     made = ForceGains(period * damping, damping, spring, INTEGRAL_DELAYS * delay, period)
-    return made.softened(max(INERTIA_SHARE * tool / (period * damping), 1.0))
+    least = INERTIA_SHARE * tool / min(period, INERTIA_PERIOD)
+    return made.softened(max(least / damping, 1.0))
 
 
 def advance(gains: ForceGains, state: LawState, error: float, fastest: float) -> LawState:

@@ -1,21 +1,38 @@
-"""Which force gains are stable in contact: predicted from stiffness and delay, in one dimension.
+"""Which force gains are stable in contact: predicted from stiffness, delay and the tool's mass.
 
-The loop is the law of `force_law` in discrete time, a pure delay (between two cycles linearly
-interpolated) and a spring of stiffness k. Its largest eigenvalue tells; no frequency response is
-approximated. A lag counts as a delay as long, which is on the safe side: of the same total, lags
-turn the phase less.
+The loop in one dimension, cycle by cycle: the law of `force_law`, the filter of eq. (10), then
+set-points that the arm takes up evenly, a dead time, a lag, and a spring. Its largest eigenvalue
+tells; no frequency response is approximated. Of a whole delay nobody tells how much is dead time:
+up to 25 ms are taken for the servos' lag, critically damped as those of position-controlled arms.
+
+A sensor feels the inertia of the tool that it carries too, which steadies some contacts and lets
+others swing, and a contact damps a little: a pen in its holder, a pad, a plate on its supports.
 """
 
 import numpy as np
 
+from dmpcli.admittance.force_coupling import Filter, fast_filter
 from dmpcli.admittance.force_law import ForceGains
 from dmpcli.arrays import Floats
 
-_STEPS, _BRACKET = 20, 100.0
-# Steps of the bisection, and how far from the rule a bound is looked for, times.
+LAG = 0.025
+"""How much of a delay is the servos' lag, s; what is beyond is dead time."""
+
+LOSS = 0.003
+"""Damping of a contact by its stiffness, s."""
+
+MARGIN = 1.1
+"""By how much gains must answer more slowly than those that begin to swing."""
+
+# Delay of the mean of a period's two readings of what is taken up evenly, in periods.
+_READ = 0.25
+# Steps within a period; of the bisection, and how far from the rule a bound is looked for, times.
+_WITHIN, _STEPS, _BRACKET = 20, 20, 100.0
+# Gains are softened by this, so many times.
+_SOFTER, _SOFTENINGS = 1.2, 15
 
 
-def loop_matrix(gains: ForceGains, stiffness: float, delay: float) -> Floats:
+def loop_matrix(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> Floats:
     """State matrix of one cycle of the closed loop.
 
     Parameters
@@ -24,66 +41,90 @@ def loop_matrix(gains: ForceGains, stiffness: float, delay: float) -> Floats:
     stiffness : float
         N/mm.
     delay : float
-        From a displacement to its force, s, without the half period that the law's own steps are.
+        From a displacement to its force as a landing measures it, s, without the half period that
+        the law's own steps are.
+    tool : float
+        Mass on the sensor's tool side, N·s²/mm, or thousand kg.
 
     Returns
     -------
     array, shape (n, n)
-        Of the state (∫f, ė, e, e one cycle ago, ...); without ∫f where there is no integral.
+        Of the state (∫f, ė, e, delta and V of eq. (10), the set-points before, the arm's position
+        and speed, the force); without ∫f where there is no integral.
     """
     T = gains.period
-    cycles = delay / T
-    whole = int(cycles)
-    share = cycles - whole
-    size = 3 + whole + 1
+    dt = T / _WITHIN
+    made = fast_filter(1.0, T)  # the same for any tau
+    dead, lag = _parts(delay, T, made)
+    whole, late = divmod(round(dead / dt), _WITHIN)
+    size = 10 + whole
+    # Each quantity is a row: how it depends on the state at the cycle's begin.
+    rows = np.eye(size)
+    integral, speed, e = rows[:3]
+    x, v, force = rows[-3:]
+    integral = integral + T * force
+    push = force + integral / gains.integral - gains.damping * speed - gains.spring * e
+    speed = speed + (T / gains.mass) * push  # eq. (1), (2)
+    e = e + T * speed  # eq. (3)
+    delta, rate = made.transition @ rows[3:5] + np.outer(made.response, e)  # eq. (10)
+    sent = np.vstack([delta, rows[5:-3]])
+    before, now, then = sent[whole + 2], sent[whole + 1], sent[whole]
+    command = before + (1.0 - late / _WITHIN) * (now - before)
+    w = 2.0 / lag
+    decay = np.exp(-w * dt) * np.array([[1.0 + w * dt, dt], [-w * w * dt, 1.0 - w * dt]])
     felt = np.zeros(size)
-    felt[2 + whole] = -stiffness * (1.0 - share)
-    felt[3 + whole] = -stiffness * share
-    integral = np.eye(size)[0] + T * felt
-    speed = np.eye(size)[1] + (T / gains.mass) * (
-        felt
-        + integral / gains.integral
-        - gains.damping * np.eye(size)[1]
-        - gains.spring * np.eye(size)[2]
-    )
-    # A surface pushes harder the deeper the tool is: e away from it lowers the force.
-    matrix = np.zeros((size, size))
-    matrix[0], matrix[1] = integral, speed
-    matrix[2] = np.eye(size)[2] + T * speed
-    matrix[3:, 2:-1] = np.eye(size - 3)
+    for n in range(1, _WITHIN + 1):
+        pace = ((now - before) if n <= late else (then - now)) / T
+        behind = decay @ np.array([x - command + lag * pace, v - pace])
+        command = command + dt * pace
+        x, v = command - lag * pace + behind[0], pace + behind[1]
+        if n in (_WITHIN // 2, _WITHIN):
+            # A surface pushes harder the deeper the tool is: e away from it lowers the force.
+            a = -w * w * behind[0] - 2.0 * w * behind[1]
+            felt = felt - 0.5 * (stiffness * (x + LOSS * v) + tool * a)
+    matrix = np.vstack([integral, speed, e, delta, rate, sent[:-1], x, v, felt])
     # Without an integral its sum goes on for ever, and has no say.
     return matrix if np.isfinite(gains.integral) else matrix[1:, 1:]
 
 
-def growth(gains: ForceGains, stiffness: float, delay: float) -> float:
+def _parts(delay: float, period: float, filter_: Filter) -> tuple[float, float]:
+    """Dead time and lag of the arm in a loop of this delay, s; the damping shortens what is met."""
+    # What the filter's step response is short of 1, summed up.
+    left = np.linalg.inv(np.eye(2) - filter_.transition)
+    late = float((left @ filter_.transition @ left @ filter_.response)[0])
+    arm = max(delay + LOSS - (late + _READ) * period, 0.0)
+    lag = min(arm, LAG)
+    return arm - lag, max(lag, period / _WITHIN)
+
+
+def growth(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> float:
     """Largest absolute eigenvalue of the loop; below 1 it comes to rest."""
-    return float(np.abs(np.linalg.eigvals(loop_matrix(gains, stiffness, delay))).max())
+    return float(np.abs(np.linalg.eigvals(loop_matrix(gains, stiffness, delay, tool))).max())
 
 
-def is_stable(gains: ForceGains, stiffness: float, delay: float) -> bool:
+def is_stable(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> bool:
     """Tell whether the force comes to rest in such a contact."""
-    return growth(gains, stiffness, delay) < 1.0
+    return growth(gains, stiffness, delay, tool) < 1.0
 
 
-def largest_stiffness(gains: ForceGains, delay: float) -> float:
-    """Stiffest contact in which the gains are stable, N/mm; by bisection, to a thousandth.
+def is_safe(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> bool:
+    """Tell whether it does with gains that answer quicker by `MARGIN`, too."""
+    return is_stable(gains.softened(1.0 / MARGIN), stiffness, delay, tool)
 
-    Parameters
-    ----------
-    gains : ForceGains
-    delay : float
-        s.
-    """
-    about = gains.damping / (delay + gains.period / 2.0)
-    low, high = about / _BRACKET, about * _BRACKET
-    for _ in range(_STEPS):
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if is_stable(gains, middle, delay) else (low, middle)
-    return low
+
+def steadied(
+    gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0
+) -> ForceGains | None:
+    """Return the gains, softened as far as such a contact needs it; None where nothing helps."""
+    for _ in range(_SOFTENINGS):
+        if is_safe(gains, stiffness, delay, tool):
+            return gains
+        gains = gains.softened(_SOFTER)
+    return None
 
 
 def smallest_damping(
-    stiffness: float, delay: float, period: float, integral: float = np.inf
+    stiffness: float, delay: float, period: float, integral: float = np.inf, tool: float = 0.0
 ) -> float:
     """Smallest stable damping of a law whose mass is period times damping, N·s/mm.
 
@@ -97,11 +138,13 @@ def smallest_damping(
         s.
     integral : float
         T_i, s.
+    tool : float
+        Mass on the sensor's tool side, N·s²/mm.
     """
     about = stiffness * (delay + period / 2.0)
     low, high = about / _BRACKET, about * _BRACKET
     for _ in range(_STEPS):
         middle = float(np.sqrt(low * high))
         gains = ForceGains(period * middle, middle, 0.0, integral, period)
-        low, high = (low, middle) if is_stable(gains, stiffness, delay) else (middle, high)
+        low, high = (low, middle) if is_stable(gains, stiffness, delay, tool) else (middle, high)
     return high

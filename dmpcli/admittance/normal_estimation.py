@@ -17,10 +17,6 @@ edge or a knock.
 import math
 from typing import TypeAlias
 
-import numpy as np
-
-from dmpcli.arrays import Floats
-
 SLOWEST = 2.0
 """mm/s: a tool that slides more slowly tells nothing of friction and tangent."""
 
@@ -34,7 +30,8 @@ _TILTS, _RUBS = 0.05, 0.02
 _FAR = 3.0
 _MOST_FRICTION = 1.0
 
-_Vector: TypeAlias = tuple[float, float, float]
+Vector: TypeAlias = tuple[float, float, float]
+"""Three plain floats: arrays of three take ten times as long, once a cycle."""
 
 
 class NormalEstimator:
@@ -56,12 +53,11 @@ class NormalEstimator:
     """
 
     def __init__(self, period: float, friction: float = _FRICTION) -> None:
-        # Scalars: this runs once a cycle, and arrays of three take ten times as long.
         self._x = (0.0, 0.0, friction)
         self._P = (_TILT**2, 0.0, 0.0, _TILT**2, 0.0, _FRICTION_KNOWN**2)  # its upper half
         self._wander = (_TILTS**2 * period, _RUBS**2 * period)
-        self._first: _Vector | None = None
-        self._axes: tuple[_Vector, _Vector, _Vector] | None = None
+        self._first: Vector | None = None
+        self._axes: tuple[Vector, Vector, Vector] | None = None
         self.heard = 0
 
     @property
@@ -70,29 +66,33 @@ class NormalEstimator:
         return self._x[2]
 
     @property
-    def normal(self) -> Floats:
-        """Unit normal, shape (3,), base axes; of something that has been felt or carried."""
+    def normal(self) -> Vector:
+        """Unit normal, base axes; of something that has been felt or carried."""
         if self._axes is None:
             raise ValueError("nothing is known of where the tool is")
         a, b, _ = self._x
         t1, t2, n = self._axes
         size = math.sqrt(1.0 + a * a + b * b)
-        return np.array([(w + a * u + b * v) / size for u, v, w in zip(t1, t2, n, strict=True)])
+        return (
+            (n[0] + a * t1[0] + b * t2[0]) / size,
+            (n[1] + a * t1[1] + b * t2[1]) / size,
+            (n[2] + a * t1[2] + b * t2[2]) / size,
+        )
 
     @property
     def angle(self) -> float:
         """Between the planned and the estimated normal, rad."""
         return math.atan(math.hypot(self._x[0], self._x[1]))
 
-    def carry(self, planned: Floats) -> None:
+    def carry(self, planned: Vector) -> None:
         """Go on to the planned normal of another place; the tilt goes with it.
 
         Parameters
         ----------
-        planned : array, shape (3,)
+        planned : tuple of float
             Unit vector.
         """
-        x, y, z = planned.tolist()
+        x, y, z = planned
         if self._first is None:
             sizes = (abs(x), abs(y), abs(z))
             least = sizes.index(min(sizes))
@@ -106,16 +106,16 @@ class NormalEstimator:
         second = (y * w - z * v, z * u - x * w, x * v - y * u)
         self._axes = (self._first, second, (x, y, z))
 
-    def feel(self, force: Floats, velocity: Floats, planned: Floats) -> bool:
+    def feel(self, force: Vector, velocity: Vector, planned: Vector) -> bool:
         """Take in one cycle.
 
         Parameters
         ----------
-        force : array, shape (3,)
+        force : tuple of float
             On the tool, base axes, N.
-        velocity : array, shape (3,)
+        velocity : tuple of float
             Of the tool, mm/s.
-        planned : array, shape (3,)
+        planned : tuple of float
             Unit normal, to the tool's side.
 
         Returns
@@ -125,10 +125,9 @@ class NormalEstimator:
         """
         self.carry(planned)
         assert self._axes is not None
-        fx, fy, fz = force.tolist()
-        vx, vy, vz = velocity.tolist()
-        f1, f2, push = (fx * x + fy * y + fz * z for x, y, z in self._axes)
-        v1, v2, rise = (vx * x + vy * y + vz * z for x, y, z in self._axes)
+        t1, t2, n = self._axes
+        push = dot(force, n)
+        v1, v2, rise = dot(velocity, t1), dot(velocity, t2), dot(velocity, n)
         speed = math.hypot(v1, v2)
         if push <= 0.0 or speed < SLOWEST:
             return False
@@ -138,8 +137,8 @@ class NormalEstimator:
         self._P = (p00 + tilts, p01, p02, p11 + tilts, p12, p22 + rubs)
         by_force = (_FORCE / push) ** 2 + _ELSE**2
         by_motion = (_MOTION / speed) ** 2 + _ELSE**2
-        self._learn(1.0, 0.0, -s1, f1 / push, by_force)
-        self._learn(0.0, 1.0, -s2, f2 / push, by_force)
+        self._learn(1.0, 0.0, -s1, dot(force, t1) / push, by_force)
+        self._learn(0.0, 1.0, -s2, dot(force, t2) / push, by_force)
         self._learn(s1, s2, 0.0, -rise / speed, by_motion)
         a, b, mu = self._x
         self._x = (a, b, min(max(mu, 0.0), _MOST_FRICTION))
@@ -169,32 +168,37 @@ class NormalEstimator:
         )
 
 
-def carried(normal: Floats, before: Floats, planned: Floats) -> Floats:
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def carried(normal: Vector, before: Vector, planned: Vector) -> Vector:
     """Carry a normal with the planned one to another place: it leans from it as it did.
 
     Parameters
     ----------
-    normal : array, shape (3,)
+    normal : tuple of float
         Unit vector, less than a right angle from `before`.
-    before, planned : array, shape (3,)
+    before, planned : tuple of float
         The planned unit normals, less than a right angle apart.
     """
-    upright = float(normal @ before)
-    lean = normal - upright * before
-    across = lean - (lean @ planned) * planned
-    size = math.sqrt(across @ across)
+    upright = dot(normal, before)
+    lean = _sum(normal, -upright, before)
+    across = _sum(lean, -dot(lean, planned), planned)
+    size = math.sqrt(dot(across, across))
     if size < 1e-12:
         return planned
-    found: Floats = upright * planned + math.sqrt(lean @ lean) / size * across
-    return found
+    longer = math.sqrt(dot(lean, lean)) / size
+    return _sum((upright * planned[0], upright * planned[1], upright * planned[2]), longer, across)
 
 
-def turned(now: Floats, wanted: Floats, planned: Floats, most: float, step: float) -> Floats:
+def turned(now: Vector, wanted: Vector, planned: Vector, most: float, step: float) -> Vector:
     """Turn a normal towards another, within a bound about the planned one and a step at a time.
 
     Parameters
     ----------
-    now, wanted, planned : array, shape (3,)
+    now, wanted, planned : tuple of float
         Unit vectors.
     most : float
         Largest angle to the planned one, rad, below a right angle.
@@ -203,18 +207,22 @@ def turned(now: Floats, wanted: Floats, planned: Floats, most: float, step: floa
 
     Returns
     -------
-    array, shape (3,)
+    tuple of float
         Unit vector.
     """
     return _near(now, _near(planned, wanted, most), step)
 
 
-def _near(centre: Floats, wanted: Floats, most: float) -> Floats:
+def _near(centre: Vector, wanted: Vector, most: float) -> Vector:
     """The direction within an angle of a centre that is nearest to the one that is wanted."""
-    cosine = float(centre @ wanted)
-    across = wanted - cosine * centre
-    sine = math.sqrt(across @ across)
+    cosine = dot(centre, wanted)
+    across = _sum(wanted, -cosine, centre)
+    sine = math.sqrt(dot(across, across))
     if math.atan2(sine, cosine) <= most or sine == 0.0:
         return wanted
-    found: Floats = math.cos(most) * centre + math.sin(most) / sine * across
-    return found
+    c = math.cos(most)
+    return _sum((c * centre[0], c * centre[1], c * centre[2]), math.sin(most) / sine, across)
+
+
+def _sum(a: Vector, times: float, b: Vector) -> Vector:
+    return (a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2])

@@ -6,20 +6,20 @@ with the same inputs and options goes on from them: each part's metadata say wha
 
 import contextlib
 import json
-import os
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from dmpcli.batch.ledger import Ledger
 from dmpcli.batch.part import FACT, Job, Outcome, outcome_of
 from dmpcli.errors import InputError
-from dmpcli.records import file_io, record, schemas
+from dmpcli.records import file_io, parquet, record, schemas
+from dmpcli.records.draft import Draft
 from dmpcli.records.record import Record
+from dmpcli.records.storage import Stats, located
 
 _TEMPORARY = ".part-*.parquet.*.tmp"
 
@@ -36,17 +36,17 @@ class Folder:
     """
 
     def __init__(self, job: Job, share: str = "1-of-1") -> None:
-        self.job, self.path = job, Path(job.folder)
+        self.job, self.path = job, located(job.folder)
         columns = {schemas.EVENT: np.empty(0, dtype=object)} if job.task.events else {}
         empty = Record(schemas.TRAJECTORY, columns, job.provenance)
         self._expected = json.loads(record.header(empty))
         self._own = () if job.prepare is None else tuple(job.provenance.facts)
         self._ledger = Ledger(self.path, self._expected, share)
         self._whole = True
-        self._there: dict[str, os.stat_result] = {}
+        self._there: Stats = {}
         self._told: dict[str, Outcome] = {}
         self._stale: set[str] = set()
-        self._table: tuple[Path, BinaryIO, record.GrowingRecord] | None = None
+        self._table: tuple[Draft, record.GrowingRecord] | None = None
 
     def open(self, whole: bool) -> None:
         """Make room for a batch, and look what is there.
@@ -121,23 +121,24 @@ class Folder:
     def _tidy(self, parts: Container[str] | None, but: Path | None = None) -> None:
         """Remove the halves that a run left which was killed: those of some parts, or all.
 
-        Another machine may be writing a part of its own share.
+        Another machine may be writing a part of its own share. In an object store there are none.
         """
+        if not isinstance(self.path, Path):
+            return
         for stale in self.path.glob(f".{file_io.TABLE}.*.tmp") if parts is None else ():
             if stale != but:
                 stale.unlink(missing_ok=True)
         for folder in file_io.part_folders(self.path):
             inner = "" if folder == self.path else f"{folder.name}/"
-            for stale in folder.glob(_TEMPORARY):
-                of = f"{inner}{stale.name[1:].split('.parquet.')[0]}.parquet"
+            for half in folder.glob(_TEMPORARY):
+                of = f"{inner}{half.name[1:].split('.parquet.')[0]}.parquet"
                 if parts is None or of in parts:
-                    stale.unlink(missing_ok=True)
+                    half.unlink(missing_ok=True)
 
     def _outcome(self, name: str, number: int) -> Outcome | None:
         """Outcome of a part that is there, whole and of the same inputs; None otherwise."""
-        file = self.path / name
         try:
-            footer = pq.read_metadata(file)
+            footer = parquet.footer(self.path / name)
             found = json.loads((footer.metadata or {})[record.KEY])
             fact = found["facts"].pop(FACT)
             if self._own:
@@ -145,7 +146,7 @@ class Folder:
                 found["facts"] = {k: v for k, v in found["facts"].items() if k in self._own}
             if found != self._expected or fact.get("number") != number:
                 return None
-            return outcome_of(fact, footer.num_rows, file.stat().st_size)
+            return outcome_of(fact, footer.num_rows, self._there[name].st_size)
         except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
 
@@ -173,21 +174,21 @@ class Folder:
             if self._table is None:
                 # There is none where no pair could be drawn: its table says why.
                 self.path.mkdir(exist_ok=True)
-                temporary, stream = file_io.temporary_of(self.path / file_io.TABLE)
-                self._table = temporary, stream, record.GrowingRecord(stream)
-            self._table[2].add(table)
+                draft = Draft(self.path / file_io.TABLE)
+                self._table = draft, record.GrowingRecord(draft.stream)
+            self._table[1].add(table)
 
     def leave(self) -> None:
         """End writing; leave no folder behind that nothing was drawn into."""
         self._ledger.close()
         if self._table is not None:
-            temporary, stream, _ = self._table
-            stream.close()
-            temporary.unlink(missing_ok=True)
+            self._table[0].drop()
+        if not isinstance(self.path, Path):
+            return
         with contextlib.suppress(OSError):
             for folder in reversed(file_io.part_folders(self.path)):
                 with contextlib.suppress(OSError):
-                    folder.rmdir()
+                    Path(str(folder)).rmdir()
 
     def finish(self, manifest: dict[str, Any]) -> None:
         """Give the table of pairs its name and, last of all, write the manifest.
@@ -198,17 +199,15 @@ class Folder:
             The folder cannot be written.
         """
         assert self._table is not None
-        temporary, stream, table = self._table
+        draft, table = self._table
         with self._writing():
             for stale in self._stale:
                 (self.path / stale).unlink()
             # A worker that died in the middle of a part has left its half.
-            self._tidy(None, temporary)
+            self._tidy(None, draft.path)
             table.close()
-            stream.flush()
-            os.fsync(stream.fileno())
-            stream.close()
-            temporary.replace(self.path / file_io.TABLE)
+            draft.settle()
+            draft.keep()
         self._table = None
         text = json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
         file_io.write(self.path / file_io.MANIFEST, text.encode())

@@ -4,17 +4,15 @@ A job and a part travel to other processes and machines, so both hold plain valu
 however often a part is drawn, its file has the same bytes.
 """
 
-import contextlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.batch.site import Prepare, Prepared, Remark, Site
+from dmpcli.batch.site import Prepare, PreparedSite, Remark, Site
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import DrawnBlock, DrawnStroke, GeneralizeOptions
 from dmpcli.dmp.generalization import draw, draw_blocks
@@ -22,8 +20,10 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.tool_speed import LEAST_HELD, held
 from dmpcli.errors import DmpError, InputError, RefusedError
 from dmpcli.records import file_io, record, trajectory
+from dmpcli.records.draft import Draft
 from dmpcli.records.record import Form, Provenance, Record
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import located
 from dmpcli.spatial import output_events
 from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.surfaces.surface import LEAVES, Status, Surface
@@ -42,7 +42,7 @@ class Job:
         Of every part.
     form : Form
     folder : str
-        Where the parts go; every process that draws must see it.
+        Where the parts go, or the URL of an object store; every process that draws must see it.
     prepare : callable, optional
         Makes pairs ready whose table names their surfaces; `task` then has none.
     nested : bool
@@ -370,13 +370,13 @@ def _where(task: Task) -> tuple[Surface | None, GeneralizeOptions]:
     return task.surface, task.style
 
 
-def _placed(one: Prepared, rows: Integers) -> dict[int, list[float]]:
+def _placed(one: PreparedSite, rows: Integers) -> dict[int, list[float]]:
     """Start, goal and a plane's normal of each pair, by its row."""
     ends = np.hstack([one.start, one.goal]).tolist()
     return {row: place + (one.normal or []) for row, place in zip(rows.tolist(), ends, strict=True)}
 
 
-def _facts_of(one: Prepared) -> dict[str, Any]:
+def _facts_of(one: PreparedSite) -> dict[str, Any]:
     """What strokes say of their skill: turned over where all of them are."""
     skill, style = one.task.skill, one.task.style
     if one.turned:
@@ -455,24 +455,21 @@ def _ends(piece: DrawnStroke) -> PieceEnds:
 def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:
     facts = drawn.provenance.facts | {FACT: outcome.fact()}
     drawn = replace(drawn, provenance=replace(drawn.provenance, facts=facts))
-    file = Path(job.folder) / job.file_of(part.number)
-    temporary: Path | None = None
+    file = located(job.folder) / job.file_of(part.number)
+    draft: Draft | None = None
     try:
         # Another machine may draw the same part: a name that nobody else has. Not flushed to the
         # disk one by one: after a power cut a part can be drawn again, and the manifest tells its
         # size.
         if job.nested:
             file.parent.mkdir(exist_ok=True)
-        temporary, stream = file_io.temporary_of(file)
-        with stream:
-            record.store(drawn, stream, job.form)
-        size = temporary.stat().st_size
-        temporary.replace(file)
+        draft = Draft(file)
+        record.store(drawn, draft.stream, job.form)
+        size = draft.keep()
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise InputError(f"{file}: cannot be written: {reason}") from None
     finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
+        if draft is not None:
+            draft.drop()
     return replace(outcome, rows=len(drawn.columns["t"]), size=size)

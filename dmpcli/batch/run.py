@@ -51,7 +51,7 @@ class Shard:
 
 
 @dataclass
-class Summary:
+class BatchSummary:
     """What a run did.
 
     Attributes
@@ -162,11 +162,11 @@ class Batch:
         """How many pairs this shard is to draw."""
         return sum(self.sizes.values())
 
-    def run(self, draw: Draw, advance: Advance) -> Summary:
+    def run(self, draw: Draw, advance: Advance) -> BatchSummary:
         """Draw the whole table, as `run`."""
         return run(iter([self]), draw, advance)
 
-    def draw(self, folder: Folder, draw: Draw, advance: Advance, summary: Summary) -> None:
+    def draw(self, folder: Folder, draw: Draw, advance: Advance, summary: BatchSummary) -> None:
         """Draw what is not there yet.
 
         Raises
@@ -174,6 +174,11 @@ class Batch:
         RefusedError, InputError
             As `run`.
         """
+        # Rows that were refused before are done, and those of other shards are nobody's here.
+        parts = range(self.first_part, self.first_part + self.cut.count)
+        ours = np.array([self.shard.has(number) for number in parts], dtype=bool)[self.cut.part]
+        refused = int((ours & ~self._admitted).sum())
+        advance(refused, refused, left_out=int((~ours).sum()))
         kept = folder.kept(self.sizes, self._hashes)
         summary.kept += len(kept)
         for outcome in self._all(kept, draw):
@@ -190,7 +195,7 @@ class Batch:
         yield from kept.values()
         yield from draw(self.job, map(self._part, (n for n in self.sizes if n not in kept)))
 
-    def _note(self, outcome: Outcome, size: int, summary: Summary) -> None:
+    def _note(self, outcome: Outcome, size: int, summary: BatchSummary) -> None:
         self._outcomes[outcome.number] = outcome
         for there, why in outcome.failed.items():
             row = there - self.table.before
@@ -328,7 +333,7 @@ class Batch:
         ]
 
 
-def run(pieces: Iterator[Batch], draw: Draw, advance: Advance) -> Summary:
+def run(pieces: Iterator[Batch], draw: Draw, advance: Advance) -> BatchSummary:
     """Draw what is not there yet; with all parts there, write table and manifest.
 
     Parameters
@@ -343,7 +348,7 @@ def run(pieces: Iterator[Batch], draw: Draw, advance: Advance) -> Summary:
 
     Returns
     -------
-    Summary
+    BatchSummary
 
     Raises
     ------
@@ -352,7 +357,7 @@ def run(pieces: Iterator[Batch], draw: Draw, advance: Advance) -> Summary:
     InputError
         The folder cannot be written.
     """
-    summary, entries = Summary(), list[manifest.Entry]()
+    summary, entries = BatchSummary(), list[manifest.Entry]()
     folder: Folder | None = None
     try:
         for piece in pieces:

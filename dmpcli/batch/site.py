@@ -5,7 +5,6 @@ cut into parts, and carried to those who draw them, before any of its surfaces i
 """
 
 import hashlib
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -15,6 +14,7 @@ from dmpcli.batch.task import Task
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import file_io
+from dmpcli.records.storage import located
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Site:
 
 def _hash(path: str) -> str | None:
     try:
-        now = os.stat(path)
+        now = located(path).stat()
         return _hash_then(path, now.st_size, now.st_mtime_ns)
     except OSError:
         return None
@@ -90,7 +90,7 @@ def _hash(path: str) -> str | None:
 @lru_cache(maxsize=1 << 16)
 def _hash_then(path: str, _size: int, _modified: int) -> str:
     """Hash of a file as it was when it had this size and time."""
-    with open(path, "rb") as stream:
+    with located(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
@@ -110,7 +110,7 @@ class PairSites:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedSite:
     """Pairs of one site, ready to be drawn.
 
     Attributes
@@ -158,7 +158,7 @@ class Remark:
     text: str
 
 
-Prepare = Callable[[Site, list[str], Pairs, Floats], tuple[Prepared, list[Remark]]]
+Prepare = Callable[[Site, list[str], Pairs, Floats], tuple[PreparedSite, list[Remark]]]
 """Makes the pairs of one site ready, with ids (n,) and durations (n,), s; raises what a user can
 mend: then none of them can be drawn."""
 

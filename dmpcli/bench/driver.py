@@ -127,7 +127,7 @@ def bench_of(address: Address, clock: Clock) -> Bench:
     return bench
 
 
-class BenchArm:
+class BenchDriver:
     """The bench's arm: set-points of its joints.
 
     Parameters
@@ -226,9 +226,9 @@ class BenchSensor:
         self._bench.end_stream()
 
 
-def robot(address: Address, clock: Clock) -> BenchArm:
+def robot(address: Address, clock: Clock) -> BenchDriver:
     """Make the arm of ``--robot bench://ARM?...``."""
-    return BenchArm(bench_of(address, clock))
+    return BenchDriver(bench_of(address, clock))
 
 
 def sensor(address: Address, clock: Clock) -> BenchSensor:

@@ -17,7 +17,7 @@ _EPS = 1e-6  # of a step: rounding
 _MOST = 256  # steps that are solved at once
 
 
-class Motion(NamedTuple):
+class ServoMotion(NamedTuple):
     """Some steps of a reference, each array of shape (n, 6): rad, rad/s, rad/s²."""
 
     position: Floats
@@ -77,7 +77,7 @@ class JointReference:
         """Head for joint angles, shape (6,), rad, evenly within `duration` s and at once."""
         self._head_for(np.array(joints, dtype=float), duration)
 
-    def advance(self, t: float, most: int) -> Motion:
+    def advance(self, t: float, most: int) -> ServoMotion:
         """Go on by some steps of the grid, as far as nothing changes meanwhile.
 
         Parameters
@@ -89,7 +89,7 @@ class JointReference:
 
         Returns
         -------
-        Motion
+        ServoMotion
             At the end of each step.
         """
         while self._coming and self._steps_to(self._coming[0][0] - t) <= 0:
@@ -103,7 +103,7 @@ class JointReference:
         error = np.array([self.position - self._command + self._lag * rate, self.velocity - rate])
         errors = self._transitions[:n] @ error
         commands = self._command + (self._step * self._numbers[:n]) * rate
-        motion = Motion(
+        motion = ServoMotion(
             commands - self._lag * rate + errors[:, 0],
             rate + errors[:, 1],
             -w * w * errors[:, 0] - 2.0 * w * errors[:, 1],

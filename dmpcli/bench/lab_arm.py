@@ -12,7 +12,7 @@ from dmpcli.errors import InputError
 from dmpcli.kinematics.models import model
 from dmpcli.simulation.elite_server.joint_arm import FeelingArm
 from dmpcli.simulation.elite_server.lab import ROBOT_MODEL, LabParameters
-from dmpcli.simulation.elite_server.workpiece import Workpiece
+from dmpcli.simulation.elite_server.workpiece import SpringWorkpiece
 from dmpcli.simulation.mock.contact import Solid
 from dmpcli.simulation.mock.parameters import Plate
 from dmpcli.surfaces.mesh import Mesh
@@ -81,7 +81,7 @@ def _solid(ground: Solid | None) -> Nothing:
     if isinstance(ground, Plate):
         across = np.eye(3)[0] if abs(ground.normal[0]) < 0.9 else np.eye(3)[1]
         return Flat(placed(ground.point, ground.normal, across))
-    if not isinstance(ground, Workpiece):
+    if not isinstance(ground, SpringWorkpiece):
         return Nothing()
     shape = ground.surface
     if ground.sign < 0.0:

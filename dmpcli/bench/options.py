@@ -109,9 +109,11 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
     servos = replace(servos, stiffness=number("arm", 1.0, 0.05, 100.0, "") * servos.stiffness)
     noise = number("noise", 0.05, 0.0, 10.0, "N")
     bias = np.array([number(f"bias_{key}", 0.0, -50.0, 50.0, "N") for key in "xyz"])
+    drift = np.array([number(f"drift_{key}", 0.0, -10.0, 10.0, "N/s") for key in "xyz"])
     sensor = WristSensor(
         noise=noise * np.array([1.0, 1.0, 1.0, 0.02, 0.02, 0.02]),
         bias=np.concatenate([bias, np.zeros(3)]),
+        drift=np.concatenate([drift, np.zeros(3)]),
         latency=number("latency", 0.0, 0.0, 1.0, "s"),
     )
     truth = options.text("truth")

@@ -86,6 +86,8 @@ class WristSensor:
         Standard deviation of the white noise of one reading, N and N·m.
     bias : array, shape (6,)
         By how much its zero differs from the tool's, N and N·m, sensor axes.
+    drift : array, shape (6,)
+        By how much the zero moves on in a second, N/s and N·m/s, sensor axes.
     latency : float
         From a reading to its arrival, s.
     limit : array, shape (6,)
@@ -94,6 +96,7 @@ class WristSensor:
 
     noise: Floats = field(default_factory=lambda: np.array([0.05] * 3 + [1e-3] * 3))
     bias: Floats = field(default_factory=lambda: np.zeros(6))
+    drift: Floats = field(default_factory=lambda: np.zeros(6))
     latency: float = 0.0
     limit: Floats = field(default_factory=lambda: np.array([145.0, 145.0, 290.0, 5.0, 5.0, 5.0]))
 

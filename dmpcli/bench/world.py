@@ -105,6 +105,8 @@ class World:
         # A zero of None is a sensor that reads 0 with nothing on it.
         zero = parameters.tool.zero
         self._bias = parameters.sensor.bias + (0.0 if zero is None else zero)
+        self._drift = parameters.sensor.drift
+        self._drifts = bool(self._drift.any())
         self._planned, self._torque = np.zeros(self._model.nv), np.zeros(self._model.nv)
         self._velocity = np.zeros(6)
         self._pushing = self._rubbing = _NONE
@@ -266,7 +268,8 @@ class World:
 
     def sensed(self) -> Floats:
         """Take one reading of the sensor, shape (6,), N and N·m, in its axes; with its noise."""
-        return self.felt() + self._bias + next(self._noise)
+        zero = self._bias + self.t * self._drift if self._drifts else self._bias
+        return self.felt() + zero + next(self._noise)
 
     def felt(self) -> Floats:
         """What truly acts on the tool at the sensor, shape (6,), N and N·m, its weight with it."""

@@ -74,7 +74,7 @@ def command(
     for name, kind in ((output, suffixes.JSON), (save, suffixes.PARQUET)):
         if name is not None:
             suffixes.check(name, kind)
-            file_io.check_writable(name)
+            file_io.check_writable(name, here=True)
     request = CalibrationRequest(
         output,
         tool,

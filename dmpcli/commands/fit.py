@@ -1,6 +1,5 @@
 """``dmpcli fit``: demonstrations in, a skill out."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,7 +16,7 @@ from dmpcli.settings.recording import RecordingOptions
 def command(
     *,
     demonstrations: Annotated[
-        list[Path],
+        list[str],
         typer.Argument(
             metavar="DEMONSTRATION",
             help="Recordings: ours, or any CSV or Parquet with t, x, y, z; - is standard input.",
@@ -25,13 +24,13 @@ def command(
         ),
     ],
     output: Annotated[
-        Path,
+        str,
         typer.Option(
             "-o", "--output", metavar="FILE", help="Skill (JSON); - is stdout.", show_default=False
         ),
     ],
     surface: Annotated[
-        Path | None,
+        str | None,
         typer.Option(metavar="FILE", help=f"What the stroke was taught on: {SURFACES}."),
     ] = None,
     surface_pose: SurfacePose = None,
@@ -44,23 +43,25 @@ def command(
     """Learn a skill from one or several demonstrations."""
     on_terminal(quiet)
     from dmpcli.records import file_io, suffixes
+    from dmpcli.records.storage import located
     from dmpcli.workflows import surface_input
     from dmpcli.workflows.fit import check_said, learn
     from dmpcli.workflows.fit_messages import summary
     from dmpcli.workflows.recording import recording
 
     check_said(given, surface is not None)
-    surface_input.check_options(surface, surface_pose, surface_unit)
+    surface_at = None if surface is None else located(surface)
+    surface_input.check_options(surface_at, surface_pose, surface_unit)
     layout = form.as_layout()
     suffixes.check(output, suffixes.JSON)
     file_io.check_writable(output)
-    if [str(path) for path in demonstrations].count(file_io.DASH) > 1:
+    if demonstrations.count(file_io.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [file_io.read(path) for path in demonstrations]
     strokes = [recording(source, layout, settings.force_profile) for source in sources]
     named = None
-    if surface is not None:
-        named = surface_input.read(surface, surface_pose, surface_unit, summary=True)
+    if surface_at is not None:
+        named = surface_input.read(surface_at, surface_pose, surface_unit, summary=True)
     learned, result = learn(sources, strokes, settings, layout, named)
     file_io.write(output, learned.content)
     names = [source.name for source in sources]

@@ -17,6 +17,7 @@ from dmpcli.settings.options import Given, choice, with_options
 if TYPE_CHECKING:
     from dmpcli.records.pair_stream import PairStream
     from dmpcli.records.pairs import PairTable
+    from dmpcli.records.storage import Location
     from dmpcli.workflows.generalize import Ready
     from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -25,15 +26,15 @@ if TYPE_CHECKING:
 def command(
     *,
     skill: Annotated[
-        Path, typer.Argument(help="Skill file of fit; - is standard input.", show_default=False)
+        str, typer.Argument(help="Skill file of fit; - is standard input.", show_default=False)
     ],
     output: Annotated[
-        Path,
+        str,
         typer.Option(
             "-o",
             "--output",
             metavar="FILE|DIR",
-            help="Trajectory file (Parquet), or with --pairs a folder.",
+            help="Trajectory file (Parquet), or with --pairs a folder; or s3://, gs://, abfs://.",
             show_default=False,
         ),
     ],
@@ -52,7 +53,7 @@ def command(
         typer.Option(metavar="RX RY RZ", help="Tool orientation at the goal, rad."),
     ] = None,
     pairs: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             metavar="FILE",
             help="Table of pairs: CSV or Parquet with x0 y0 z0 xg yg zg [id duration] and, of each "
@@ -60,7 +61,7 @@ def command(
         ),
     ] = None,
     surface: Annotated[
-        Path | None,
+        str | None,
         typer.Option(metavar="FILE", help=f"What to draw on: {SURFACES}."),
     ] = None,
     surface_pose: SurfacePose = None,
@@ -89,28 +90,32 @@ def command(
     from dmpcli.records import file_io, learned_skill, pair_stream
     from dmpcli.records import pairs as pair_file
     from dmpcli.records.record import encode
+    from dmpcli.records.storage import located
     from dmpcli.workflows import batches, process, single, surface_input
     from dmpcli.workflows.generalize import Order, prepared
     from dmpcli.workflows.generalize_inputs import one_pair
 
     batch_options.check(wanted, given, pairs is not None)
     _check_orientations(pairs, (start_orientation, goal_orientation))
-    _check_destination(output, start, goal, pairs, reproduce)
+    target = located(output)
+    pairs_at = None if pairs is None else located(pairs)
+    surface_at = None if surface is None else located(surface)
+    _check_destination(target, start, goal, pairs, reproduce)
     if wanted.jobs > 1:
         from dmpcli.batch import process_pool
 
         process_pool.begin()
     table = stream = None
     sha256 = ""
-    if pairs is not None:
-        stream = pair_stream.opened(pairs)
+    if pairs_at is not None:
+        stream = pair_stream.opened(pairs_at)
         if stream is not None:
             table, sha256 = stream.first(), stream.sha256
         else:
-            source = file_io.read(pairs)
+            source = file_io.read(pairs_at)
             table, sha256 = pair_file.read(source), source.sha256
     # A table may name surfaces itself, or some of them.
-    named = surface or (pairs if table is not None and table.places is not None else None)
+    named = surface_at or (pairs_at if table is not None and table.places is not None else None)
     _check_together(named, given)
     process.check(settings, given, named, keep_out)
     surface_input.check_options(named, surface_pose, surface_unit)
@@ -121,10 +126,10 @@ def command(
     sites = table is not None and table.places is not None
     batch_options.check_surfaces(wanted, given, sites, named is not None)
     read = None
-    if surface is not None and not sites:
+    if surface_at is not None and not sites:
         store = surface_input.store_in(wanted.surface_cache)
-        read = surface_input.read(surface, surface_pose, surface_unit, True, store)
-    settings = _with_means(settings, output, table, stream, read)
+        read = surface_input.read(surface_at, surface_pose, surface_unit, True, store)
+    settings = _with_means(settings, target, table, stream, read)
     inputs: list[dict[str, str]] = []
     if table is None:
         assert start is not None
@@ -148,10 +153,10 @@ def command(
         options,
         inputs,
     )
-    if pairs is None:
+    if pairs_at is None:
         drawn = single.draw_one(prepared(order))
-        file_io.write(output, encode(drawn.record))
-        tell(f"{file_io.shown(output, output=True)}: {drawn.said}")
+        file_io.write(target, encode(drawn.record))
+        tell(f"{file_io.shown(target, output=True)}: {drawn.said}")
         return
 
     def ready_of(some: "PairTable") -> "Ready":
@@ -159,23 +164,21 @@ def command(
             return prepared(replace(order, table=some, inputs=list(inputs)))
         from dmpcli.workflows.generalize_sites import Otherwise, prepared_sites
 
-        otherwise = Otherwise(
-            None if surface is None else str(surface), surface_pose, surface_unit, place.in_
-        )
-        folder = Path() if str(pairs) == file_io.DASH else pairs.parent
+        otherwise = Otherwise(surface, surface_pose, surface_unit, place.in_)
+        folder = Path() if pairs == file_io.DASH else pairs_at.parent
         mine = replace(order, table=some, inputs=list(inputs))
         return prepared_sites(mine, folder, otherwise, wanted.surface_cache)
 
     if stream is not None:
-        batches.write_pieces(stream, ready_of, output, wanted)
+        batches.write_pieces(stream, ready_of, target, wanted)
         return
     batches.tell_of_unknown(table)
-    batches.write(ready_of(table), output, wanted)
+    batches.write(ready_of(table), target, wanted)
 
 
 def _with_means(
     settings: GeneralizeSettings,
-    output: Path,
+    output: "Location",
     table: "PairTable | None",
     stream: "PairStream | None",
     read: "SurfaceInput | None",
@@ -198,9 +201,7 @@ def _with_means(
     return replace(settings, kernels=means)
 
 
-def _check_orientations(
-    pairs: Path | None, orientations: tuple[Point | None, Point | None]
-) -> None:
+def _check_orientations(pairs: str | None, orientations: tuple[Point | None, Point | None]) -> None:
     """Refuse orientations of one pair where a table names those of many."""
     if pairs is not None and any(orientations):
         raise InputError(
@@ -209,14 +210,14 @@ def _check_orientations(
         )
 
 
-def _check_together(surface: Path | None, given: Given) -> None:
+def _check_together(surface: "Location | None", given: Given) -> None:
     """Refuse options that say nothing without a surface."""
     alone = [f"--{name}" for name in ("contact", "offset") if name in given]
     if surface is None and alone:
         raise InputError(f"{' and '.join(alone)}: what is said of a --surface; name one")
 
 
-def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
+def _check_frame(in_: str, surface: "Location | None", reproduce: bool) -> None:
     if in_ == "part" and surface is None:
         raise InputError("--in part: the axes of which part? Name it with --surface")
     if in_ == "part" and reproduce:
@@ -224,9 +225,14 @@ def _check_frame(in_: str, surface: Path | None, reproduce: bool) -> None:
 
 
 def _check_destination(
-    output: Path, start: Point | None, goal: Point | None, pairs: Path | None, reproduce: bool
+    output: "Location",
+    start: Point | None,
+    goal: Point | None,
+    pairs: str | None,
+    reproduce: bool,
 ) -> None:
     from dmpcli.records import file_io, record, suffixes
+    from dmpcli.records.object_store import ObjectPath
     from dmpcli.records.pairs import FARTHEST
     from dmpcli.workflows.ranges import within
 
@@ -249,7 +255,12 @@ def _check_destination(
     if start is not None or goal is not None:
         raise InputError("--pairs names the starts and goals; leave --start and --goal out")
     file_io.check_folder(output)
-    foreign = record.foreign_parts(output)
+    known: set[str] = set()
+    if isinstance(output, ObjectPath):  # to ask each takes its time
+        from dmpcli.batch import ledger
+
+        known = ledger.told_in(output, file_io.parts_of(output))
+    foreign = record.foreign_parts(output, known)
     if foreign:
         raise InputError(
             f"{output}: holds {foreign[0]}, which is not of dmpcli; choose another folder"

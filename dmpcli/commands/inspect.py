@@ -1,6 +1,5 @@
 """``dmpcli inspect``: what a file is."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -35,7 +34,7 @@ def command(
         ),
     ] = None,
     skill: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--for",
             metavar="FILE",
@@ -55,8 +54,10 @@ def command(
         return
     if file is None:
         raise InputError("FILE is missing: name a file, or - for standard input")
+    from dmpcli.records.storage import located
     from dmpcli.workflows.inspect import inspect
 
-    found = inspect(file, form.as_layout(), form.as_words(), skill)
+    learned = None if skill is None else located(skill)
+    found = inspect(file, form.as_layout(), form.as_words(), learned)
     text = inspection.as_json(found) if as_json else inspection.as_text(found, _WIDTH).encode()
     file_io.say(text)

@@ -10,7 +10,7 @@ from dmpcli.errors import InputError, counted
 from dmpcli.messages import on_terminal, tell
 
 if TYPE_CHECKING:
-    from dmpcli.records.journal import Found
+    from dmpcli.records.journal import JournalContent
     from dmpcli.records.record import Record
 
 
@@ -32,7 +32,7 @@ def command(
     from dmpcli.workflows.run_output import write_once
 
     suffixes.check(output, suffixes.PARQUET)
-    file_io.check_writable(output)
+    file_io.check_writable(output, here=True)
     if output != file_io.DASH and Path(output).is_file() and not force:
         raise InputError(f"{output}: exists; choose another name, or give --force")
     found = journals.read(file_io.read(journal, journal=True))
@@ -41,7 +41,7 @@ def command(
     tell(_summary(output, journal, found, whole))
 
 
-def _record(found: "Found") -> "Record":
+def _record(found: "JournalContent") -> "Record":
     """Return the proper file's record; a run that came to its end gives the very same file."""
     from dataclasses import replace
 
@@ -62,7 +62,7 @@ def _record(found: "Found") -> "Record":
     return Record(found.schema, columns, replace(found.provenance, facts=facts))
 
 
-def _summary(output: str, journal: str, found: "Found", whole: "Record") -> str:
+def _summary(output: str, journal: str, found: "JournalContent", whole: "Record") -> str:
     from dmpcli.records import file_io
 
     state = "all of the run" if found.whole else "as far as the journal goes"

@@ -26,13 +26,13 @@ def command(
         ),
     ],
     surface: Annotated[
-        Path | None,
+        str | None,
         typer.Option(metavar="FILE", help=f"What the strokes lie on: {SURFACES}."),
     ] = None,
     surface_pose: SurfacePose = None,
     surface_unit: SurfaceUnit = None,
     pairs: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             metavar="FILE", help="The table that a batch was drawn from, if it names surfaces."
         ),
@@ -42,7 +42,7 @@ def command(
         typer.Option(metavar="DIR", help="Keep prepared meshes of --pairs here for later runs."),
     ] = None,
     output: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "-o",
             "--output",
@@ -73,17 +73,23 @@ def command(
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     on_terminal(quiet)
     from dmpcli.records import file_io
+    from dmpcli.records.storage import located
     from dmpcli.workflows import surface_input
     from dmpcli.workflows.report import check_output, report
 
     if files.count("-") > 1:
         raise InputError("-: standard input can be read only once; name the other files")
-    surface_input.check_options(pairs or surface, surface_pose, surface_unit)
+    target = None if output is None else located(output)
+    pairs_at = None if pairs is None else located(pairs)
+    surface_at = None if surface is None else located(surface)
+    surface_input.check_options(pairs_at or surface_at, surface_pose, surface_unit)
     if surface_cache is not None and pairs is None:
         raise InputError("--surface-cache: belongs to --pairs; leave it out")
-    check_output(output)
-    if output is None and (view or show):
+    check_output(target)
+    if target is None and (view or show):
         raise InputError("--view and --open need the folder of the pages: give -o DIR")
+    if show and not isinstance(target, Path):
+        raise InputError("--open: shows a page of this machine, and -o names a store; leave it out")
     if view:
         from dmpcli.reporting.turnable import check
 
@@ -94,19 +100,18 @@ def command(
         process_pool.begin()
     layout = form.as_layout()
     read = grounds = None
-    if pairs is not None:
+    if pairs_at is not None:
         from dmpcli.workflows.generalize_sites import Otherwise
         from dmpcli.workflows.report_sites import SiteGrounds
 
-        named = None if surface is None else str(surface)
-        otherwise = Otherwise(named, surface_pose, surface_unit)
-        grounds = SiteGrounds(pairs, otherwise, surface_cache)
-    elif surface is not None:
-        read = surface_input.read(surface, surface_pose, surface_unit)
-    made = report(files, None, layout, read, output, grounds, paper, view, png, wanted.jobs)
+        otherwise = Otherwise(surface, surface_pose, surface_unit)
+        grounds = SiteGrounds(pairs_at, otherwise, surface_cache)
+    elif surface_at is not None:
+        read = surface_input.read(surface_at, surface_pose, surface_unit)
+    made = report(files, None, layout, read, target, grounds, paper, view, png, wanted.jobs)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
-    if show and output is not None:
-        typer.launch(str((output / ("view.html" if view else "report.html")).resolve()))
+    if show and isinstance(target, Path):
+        typer.launch(str((target / ("view.html" if view else "report.html")).resolve()))
 
 
 def _width() -> int:

@@ -1,7 +1,7 @@
-"""What every subcommand takes: ``--log``, ``--json`` and, if it has settings, ``--print-config``.
+"""What every subcommand takes: ``--log``, ``--json`` and ``--print-config``.
 
-A command that prints JSON of its own by ``--json`` keeps it. Of any other, the JSON says how it
-ended, everything that it told, and what its output file is.
+A command that prints JSON of its own by ``--json`` keeps it where it succeeds. Of any other, and of
+one that fails, the JSON says how it ended, everything that it told, and what its output file is.
 """
 
 import contextlib
@@ -9,7 +9,7 @@ import inspect
 import json
 import logging
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +20,14 @@ from dmpcli.messages import LOG, logged
 from dmpcli.version import __version__
 
 if TYPE_CHECKING:
+    from dmpcli.settings.described import Row
     from dmpcli.settings.options import Described
+
+OUTPUTS = ("output", "save")
+"""Parameters that name what a command writes; ``-`` is standard output."""
+
+TELLING = {"as_json", "print_config", "help"}
+"""Parameters that ask for words, and set nothing."""
 
 Log = Annotated[
     Path | None,
@@ -56,18 +63,19 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     if not own_json:
         parameters.append(_parameter("as_json", AsJson, False))
     parameters.append(_parameter("log", Log, None))
-    if describe is not None:
-        parameters.append(_parameter("print_config", PrintConfig, False))
+    parameters.append(_parameter("print_config", PrintConfig, False))
+    parameters.append(_parameter("context", typer.Context, inspect.Parameter.empty))
 
     def run(**said: Any) -> None:
-        log, asked = said.pop("log"), said.pop("print_config", False)
+        log, asked, context = (said.pop(one) for one in ("log", "print_config", "context"))
         as_json = said["as_json"] if own_json else said.pop("as_json")
-        line = shlex.join(["dmpcli", name, *words])
+        line = shlex.join(["dmpcli", name, *map(_printed, words)])
         with logged(log, f"{line} (dmpcli {__version__})"):
-            if asked and describe is not None:
-                _print(describe(name, said, as_json))
-            elif as_json and not own_json:
-                with _as_json(name, str(said.get("output") or "")):
+            if asked:
+                others = _others(context, getattr(command, "settings", ()))
+                _print(_described(describe, name, said, as_json, others))
+            elif as_json:
+                with outcome(name, said, own_json):
                     command(**said)
             else:
                 command(**said)
@@ -75,6 +83,53 @@ def shared(command: Callable[..., None], name: str, words: Sequence[str]) -> Cal
     run.__doc__, run.__module__, run.__name__ = command.__doc__, command.__module__, "command"
     run.__dict__.update(__signature__=inspect.Signature(parameters), __wrapped__=command)
     return run
+
+
+def _printed(word: str) -> str:
+    """Return a word of the command line as a log may keep it: without credentials."""
+    if "://" not in word:
+        return word
+    from dmpcli.records.storage import hidden
+
+    return hidden(word)
+
+
+def _described(
+    describe: "Described | None",
+    name: str,
+    said: dict[str, Any],
+    as_json: bool,
+    others: "Sequence[Row]",
+) -> str:
+    if describe is not None:
+        return describe(name, said, as_json, others)
+    from dmpcli.settings.described import text
+
+    return text(name, (), as_json, others)
+
+
+def _others(context: Any, settings: Sequence[str]) -> "list[Row]":
+    """Return what no settings model holds: files, instruments, switches, and who named them."""
+    from dmpcli.settings.described import plain
+
+    rows = []
+    for one in context.command.params:
+        if one.name in TELLING or one.name in settings:
+            continue
+        argument = one.param_type_name == "argument"
+        flag = (one.metavar or one.name.upper()) if argument else max(one.opts, key=len)
+        given = context.get_parameter_source(one.name).name == "COMMANDLINE"
+        value = plain(context.params[one.name])
+        source = f"{one.param_type_name} {flag}" if given else "default"
+        _, _, unset = (one.help or "").partition("  [default: ")
+        told = unset.removesuffix("]") if value is None else ""
+        rows.append(_row(flag, value, source, told))
+    return rows
+
+
+def _row(key: str, value: Any, source: str, unset: str) -> "Row":
+    made = {"section": "", "key": key, "value": value, "unit": "", "source": source}
+    return made | {"unset": unset}
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
@@ -97,9 +152,24 @@ class _Gatherer(logging.Handler):
 
 
 @contextlib.contextmanager
-def _as_json(name: str, output: str) -> Iterator[None]:
-    """Print one JSON document at the end, however it comes."""
-    if output == "-":
+def outcome(name: str, said: Mapping[str, Any], own_json: bool = False) -> Iterator[None]:
+    """Print one JSON document at the end, however it comes.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    said : mapping
+        What the command line says, by parameter.
+    own_json : bool
+        Whether the command prints JSON itself where it succeeds.
+
+    Raises
+    ------
+    InputError
+        Standard output would hold a file too.
+    """
+    if any(str(said.get(one)) == "-" for one in OUTPUTS):
         raise InputError("--json: standard output holds the file; name one with -o")
     gatherer, code, error = _Gatherer(), 1, None
     LOG.addHandler(gatherer)
@@ -120,15 +190,18 @@ def _as_json(name: str, output: str) -> Iterator[None]:
         raise
     finally:
         LOG.removeHandler(gatherer)
-        document = {"schema": "outcome", "version": 1, "command": name, "exit_code": code}
-        document |= {"error": error, "messages": gatherer.told} | gatherer.facts
-        document["output"] = _described(output) if code == 0 else None
-        _print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        if not own_json or error is not None:
+            document = {"schema": "outcome", "version": 1, "command": name, "exit_code": code}
+            document |= {"error": error, "messages": gatherer.told} | gatherer.facts
+            document["output"] = _written(str(said.get("output") or "")) if code == 0 else None
+            _print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def _described(output: str) -> Any:
+def _written(output: str) -> Any:
     """Return what ``inspect --json`` says of the output, if it is one file or folder."""
-    if not output or not Path(output).exists():
+    from dmpcli.records.storage import located
+
+    if not output or not (place := located(output)).exists():
         return None
     from dmpcli.reporting import inspection
     from dmpcli.workflows.inspect import inspect as inspected
@@ -136,7 +209,7 @@ def _described(output: str) -> Any:
     try:
         return json.loads(inspection.as_json(inspected(output)))
     except DmpError:  # a file of another program
-        return {"file": output, "bytes": Path(output).stat().st_size}
+        return {"file": output, "bytes": place.stat().st_size}
 
 
 def _print(text: str) -> None:

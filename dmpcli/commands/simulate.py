@@ -1,5 +1,6 @@
 """``dmpcli simulate``: a virtual lab on loopback, to rehearse with no hardware."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +49,9 @@ def command(
         typer.Option(metavar="FILE", help="Keep where the hand truly drew; a demonstration file."),
     ] = None,
     settings: Annotated[RecordSettings, Only("duration", *TUTOR)],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Say that it is ready, and its URLs, as a line of JSON.")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Serve a force/torque sensor and an EC66 arm that share one physics, until Ctrl-C."""
@@ -69,7 +73,9 @@ def command(
         )
     faults = fault_words.parse(served.fault)
     if drawn is not None:
-        file_io.check_writable(drawn)
+        if drawn == file_io.DASH:
+            raise InputError("--drawn -: standard output holds what is ready; name a file")
+        file_io.check_writable(drawn, here=True)
     setting, hand = _scene(settings, faults, tool, served.strokes, served.lookahead)
     if surface is not None:
         setting = _on(surface, surface_pose, surface_unit, setting)
@@ -93,6 +99,10 @@ def command(
             VirtualLab(setting, hand), faults, served.host, ports, settings.seed
         ) as serving:
             line = f"ready sensor={serving.sensor_url} robot={serving.robot_url}"
+            if as_json:
+                ready = {"schema": "lab", "version": 1}
+                ready |= {"sensor": serving.sensor_url, "robot": serving.robot_url}
+                line = json.dumps(ready)
             print(line, flush=True)  # noqa: T201
             if not loopback(served.host):
                 warn(

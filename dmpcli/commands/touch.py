@@ -58,7 +58,7 @@ def command(
     _check(pairs, angles, part, every, count)
     repeatable = workcell.repeatable(workcell.check(robot, None))
     suffixes.check(output, suffixes.CSV)
-    file_io.check_writable(output)
+    file_io.check_writable(output, here=True)
     if output != "-" and not (repeatable or force) and Path(output).exists():
         raise InputError(
             f"{output}: exists, and points cannot be touched again alike; choose another name, or "

@@ -4,22 +4,19 @@ Forces are along the normal, N, positive where the surface pushes; e is in mm al
 positive away from the surface. Scalars only: this runs once a cycle.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
 from dmpcli.admittance.contact_estimation import RiseTest
 from dmpcli.admittance.force_law import ForceGains, LawState
 from dmpcli.admittance.oscillation import AlternationDetector
-from dmpcli.control.contact_policy import ContactEvent, ContactPolicy, ContactState, MetWall
+from dmpcli.control.contact_policy import ContactEvent, ContactPolicy, ContactState
 from dmpcli.control.landing import Landing
 
 # The lift is looked at this far before its end, mm.
 _STEP = 1.0
 # s that a resting force is waited for, beside the delay.
 REST = 0.1
-# Cycles over which a force across the normal is seen to rise.
-_SIDES = 4
 
 
 class ContactCourse:
@@ -52,8 +49,8 @@ class ContactCourse:
         In this cycle the correction met its own limits.
     landing_peak : float
         Largest force of the landings, N.
-    wall : MetWall or None
-        What ended the run, if a wall did.
+    across : float or None
+        Force across the normal that ended the run, if a wall did, N.
     """
 
     def __init__(
@@ -73,7 +70,7 @@ class ContactCourse:
         self.failure, self.urgent = "", False
         self.doubted = self.saturated = False
         self.landing_peak = 0.0
-        self.wall: MetWall | None = None
+        self.across: float | None = None
         self._softened = False
         self.begin()
 
@@ -100,7 +97,6 @@ class ContactCourse:
         self._felt: list[tuple[float, float]] = []
         self._landing: Landing | None = None
         self._lost_at = 0.0
-        self._sides: deque[float] = deque(maxlen=_SIDES)
         self._rise = RiseTest(slack=0.3)
         self._swings: AlternationDetector | None = None
 
@@ -123,6 +119,11 @@ class ContactCourse:
     def _lag(self) -> float:
         known = self.policy.whole_delay
         return (self.policy.delay if known is None else known) + self._period
+
+    @property
+    def reaction(self) -> float:
+        """From a displacement to what is done about its force, s."""
+        return self._known_delay + self._period
 
     @property
     def _known_delay(self) -> float:

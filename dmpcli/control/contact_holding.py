@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 from dmpcli.admittance.force_law import LawState, advance, by_rule
 from dmpcli.admittance.oscillation import AlternationDetector
 from dmpcli.control.contact_course import ContactCourse
-from dmpcli.control.contact_policy import MetWall
 
 # How near the force must stay to its set-point, as a share of it, and for so long, s.
 NEAR, NEAR_TIME = 0.1, 0.1
@@ -15,10 +13,15 @@ NEAR, NEAR_TIME = 0.1, 0.1
 _LANDING = 1.5
 # Until a landing has come near to its set-point its gains are softened so much.
 _GENTLE = 1.5
+# Where a surface that was lost is met again the force may rise over the set-point by this share of
+# it, after the delay and so many periods; no faster than this, mm/s.
+_MORE, _CYCLES, _FASTEST = 0.5, 2.0, 20.0
 # Stiffness that is taken where nothing was measured, N/mm.
 _USUAL = 5.0
 # Of an oscillation: alternations within so many delays, of a share of the set-point, or N.
 _SWINGS, _WITHIN, _SWING_SHARE, _SWING = 6, 20.0, 0.3, 0.5
+# What a friction that is known may be off by, and a tilt may add.
+_RUBS = 0.2
 # Saturation is told once it has lasted so long, s.
 _SATURATED = 0.1
 
@@ -38,14 +41,30 @@ class HeldForce(ContactCourse):
 
     def _draw(self, t: float, force: float, wanted: float) -> None:
         if force <= self._least:
-            # Held: taken as a contact that pushes too little, no force would lead into the air.
             self._absent += self._period
-            self.law = replace(self.law, speed=0.0)
+            self._regain(wanted)
             if self._absent > self.policy.patience:
                 self._lose(t)
             return
         self._absent = 0.0
         self._hold_force(t, force, wanted)
+
+    def _again(self, wanted: float) -> float:
+        """How fast a surface that was lost is gone after, mm/s: what that costs is known."""
+        k = self.stiffness or self.policy.stiffness or _USUAL
+        late = self._known_delay + _CYCLES * self._period
+        return min(_MORE * wanted / (k * late), _FASTEST)
+
+    def _regain(self, wanted: float) -> None:
+        """Go on after a surface that has just fallen away, where it is to be sought.
+
+        Taken as a contact that pushes too little, no force would lead into the air.
+        """
+        policy, law, speed = self.policy, self.law, self._again(wanted)
+        if policy.on_loss == "seek" and law.e - speed * self._period > -policy.clamp:
+            self.law = LawState(law.e - speed * self._period, -speed, law.integral)
+        else:
+            self.law = replace(law, speed=0.0)
 
     def _hold_force(self, t: float, force: float, wanted: float) -> None:
         """One step of the law, within the coupling's own limits."""
@@ -105,10 +124,9 @@ class HeldForce(ContactCourse):
         self._swings.reset()
         self._become(before, t)
 
-    def _guard(self, t: float, force: float, across: float, wanted: float, speed: float) -> None:
+    def _guard(self, t: float, force: float, across: float, wanted: float, friction: float) -> None:
         """Stop at once at a force that the tool must not meet."""
         policy = self.policy
-        self._sides.append(across)
         most = policy.limit * max(wanted, 2.0 * policy.contact)
         if self.state == "landing" and not self._settled:
             most *= _LANDING
@@ -122,19 +140,13 @@ class HeldForce(ContactCourse):
                 "loop can follow",
                 urgent=True,
             )
-        elif across > policy.drag + policy.rub * max(force, 0.0):
-            said = ""
-            sides = list(self._sides)
-            rise = max((b - a for a, b in pairwise(sides)), default=0.0) / self._period
-            if rise > 0.0 and speed > 0.0:
-                reaction = self._known_delay + self._period
-                self.wall = MetWall(across, speed, rise / speed, reaction)
-                said = f" ({self.wall})"
+        elif across > policy.drag + max(policy.rub, friction + _RUBS) * max(force, 0.0):
+            self.across = across
             self.fail(
                 t,
                 "too hard",
                 f"{across:.1f} N across the normal beside {force:.1f} N along it: the tool has met "
-                f"a wall or an edge{said}",
+                "a wall or an edge, or rubs harder than coupling_drag and coupling_rub allow",
                 urgent=True,
             )
 
@@ -146,9 +158,10 @@ class HeldForce(ContactCourse):
         if self.state != "lost":
             self._become("lost", t, why)
         self._lost_at, self._count = self.law.e, 0
-        self.law = replace(self.law, speed=0.0, integral=0.0)
+        seeks = policy.on_loss == "seek" and not why
+        self.law = replace(self.law, speed=self.law.speed if seeks else 0.0, integral=0.0)
         self._felt.clear()
-        if policy.on_loss == "seek" and not why:
+        if seeks:
             self._become("seeking", t)
         elif why:
             self.fail(t, "lost", f"{why}: it is no contact; check the tool's zero")

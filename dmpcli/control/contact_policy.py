@@ -1,5 +1,7 @@
 """What a contact supervisor goes by: limits, speeds and what it does where contact is lost."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +17,8 @@ ContactState = Literal[
     "oscillating",
     "retreating",
 ]
+# So many changes are named one by one.
+_NAMED = 12
 OnContactLoss = Literal["seek", "hold", "stop"]
 
 
@@ -45,7 +49,7 @@ class ContactPolicy:
         Largest force along the normal, times the set-point.
     drag, rub : float
         Force across the normal that is no friction any more: more than `drag` N and `rub` times
-        the normal force.
+        the normal force, or 0.2 more than the friction that was felt times it.
     patience : float
         s without contact until it counts as lost.
     on_loss : {'seek', 'hold', 'stop'}
@@ -89,40 +93,6 @@ class ContactPolicy:
 
 
 @dataclass(frozen=True)
-class MetWall:
-    """A wall or an edge that a stroke ran into, and what no loop of its delay had spared it.
-
-    Attributes
-    ----------
-    across : float
-        Force across the normal at which the stroke was ended, N.
-    speed : float
-        Of the stroke, mm/s.
-    stiffness : float
-        Of tool and wall across the normal, by how fast the force rose, N/mm.
-    reaction : float
-        From a displacement to what is done about its force, s.
-    """
-
-    across: float
-    speed: float
-    stiffness: float
-    reaction: float
-
-    @property
-    def unavoidable(self) -> float:
-        """Force that is met before anything can be done: reaction time by speed by stiffness, N."""
-        return self.reaction * self.speed * self.stiffness
-
-    def __str__(self) -> str:
-        """Say it in one line."""
-        return (
-            f"{self.across:.1f} N across the normal; {self.unavoidable:.1f} N are unavoidable at "
-            f"{self.speed:.3g} mm/s on {self.stiffness:.3g} N/mm behind {self.reaction:.2g} s"
-        )
-
-
-@dataclass(frozen=True)
 class ContactEvent:
     """One change of state.
 
@@ -142,3 +112,19 @@ class ContactEvent:
         """Say it in one line."""
         more = f": {self.detail}" if self.detail else ""
         return f"contact at {self.t:.2f} s: {self.state}{more}"
+
+
+def course(events: Sequence[ContactEvent]) -> str:
+    """Name the changes of a run with their times; of many, how often each state was entered.
+
+    Parameters
+    ----------
+    events : sequence of ContactEvent
+    """
+    pairs = zip(events, [None, *events], strict=False)
+    # An event that changes no state says something else, as of limits that are met.
+    changes = [one for one, last in pairs if last is None or one.state != last.state]
+    if len(changes) <= _NAMED:
+        return ", ".join(f"{one.state} at {one.t:.2f} s" for one in changes)
+    count = Counter(one.state for one in changes)
+    return ", ".join(f"{number} × {state}" for state, number in count.items())

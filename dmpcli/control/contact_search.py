@@ -2,8 +2,7 @@
 
 from dataclasses import replace
 
-from dmpcli.admittance.force_law import LEAST_INERTIA_SHARE
-from dmpcli.admittance.force_stability import is_stable
+from dmpcli.admittance.force_stability import is_safe, steadied
 from dmpcli.control.contact_course import REST
 from dmpcli.control.contact_holding import NEAR, NEAR_TIME, HeldForce
 from dmpcli.control.guarded_motion import sinking
@@ -13,6 +12,8 @@ from dmpcli.control.landing import Landing
 _LONGEST = 60.0
 # Of what a delay is measured at, no more than this is believed, s.
 _LATEST = 0.5
+# No nearer than this to a set-point is asked of a reading, N.
+_NOISE = 0.15
 # Fastest that is looked for a surface whose stiffness is known, mm/s, and the force it may cost.
 _KNOWN, _COST = 8.0, 0.4
 
@@ -66,7 +67,8 @@ class SoughtSurface(HeldForce):
                     "surface and sensor",
                 )
             return
-        self.law = sinking(self.law, self._speed, self._period)
+        speed = self._again(wanted) if again else self._speed
+        self.law = sinking(self.law, speed, self._period)
 
     def _land(self, t: float, force: float, wanted: float) -> None:
         self._clock += self._period
@@ -98,40 +100,40 @@ class SoughtSurface(HeldForce):
             )
         elif landing.found is not None:
             self.stiffness = landing.found.stiffness
+            late = min(landing.found.delay, _LATEST)
             if policy.whole_delay is None:
-                self.delay = max(policy.delay, min(landing.found.delay, _LATEST))
+                # The gains are on the safe side of what the arm tells of itself.
+                self.delay = max(policy.delay, late)
             self._choose()
-            if not self._refused(t):
+            if not self._refused(t, late):
                 self._stage, self._near = "settle", 0.0
 
-    def _refused(self, t: float) -> bool:
-        """Refuse gains that the contact just measured would make swing."""
-        k, delay, tool = self.stiffness, self._known_delay, self.policy.tool_mass
+    def _refused(self, t: float, late: float) -> bool:
+        """Refuse gains that the contact just measured would make swing; `late` is its delay, s.
+
+        Those by the rule are softened instead: a heavy tool on a quick arm needs that.
+        """
+        k, tool = self.stiffness, self.policy.tool_mass
         if self.gains is None or k is None:
             return False
-        if self.gains.damping < LEAST_INERTIA_SHARE * 1e-3 * tool / self._period:
-            self.fail(
-                t,
-                "oscillating",
-                f"damping {self.gains.damping:.3g} N·s/mm is unstable on a tool of {tool:.3g} kg, "
-                f"whose inertia is felt too, on {k:.3g} N/mm behind {delay:.3g} s: leave the gains "
-                "to the rule, or use a lighter tool",
-            )
-            return True
-        if is_stable(self.gains, k, delay):
+        chosen = self.policy.gains is not None
+        held = None if chosen else steadied(self.gains, k, late, 1e-3 * tool)
+        if held is not None or (chosen and is_safe(self.gains, k, late, 1e-3 * tool)):
+            self.gains = held or self.gains
             return False
+        heavy = f" with a tool of {tool:.3g} kg, whose inertia is felt too" if tool else ""
         self.fail(
             t,
             "oscillating",
             f"damping {self.gains.damping:.3g} N·s/mm is unstable on a contact of {k:.3g} N/mm "
-            f"behind {delay:.3g} s: leave the gains to the rule, or use a softer tool or a "
-            "shorter look-ahead",
+            f"behind {late:.3g} s{heavy}: leave the gains to the rule, or use a softer or lighter "
+            "tool, or a shorter look-ahead",
         )
         return True
 
     def _settle(self, t: float, force: float, wanted: float) -> None:
         self._hold_force(t, force, wanted)
-        near = abs(force - wanted) <= NEAR * wanted
+        near = abs(force - wanted) <= max(NEAR * wanted, _NOISE)
         self._near = self._near + self._period if near else 0.0
         if self._settled:
             if force >= 0.5 * wanted:

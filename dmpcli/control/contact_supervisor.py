@@ -33,7 +33,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         self.law = LawState(e)
 
     def step(
-        self, t: float, force: float, across: float, wanted: float, speed: float = 0.0
+        self, t: float, force: float, across: float, wanted: float, friction: float = 0.0
     ) -> float:
         """Take in one cycle's force; return e, mm.
 
@@ -45,8 +45,8 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
             Along the normal, and its size across it, N.
         wanted : float
             F_d at this set-point, N; 0 where the tool is lifted.
-        speed : float
-            Of the plan along the stroke, mm/s.
+        friction : float
+            Coulomb's coefficient as it was felt; 0 where it was not yet.
         """
         self.saturated = False
         if self.failure:
@@ -56,7 +56,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         self._least = min(contact, wanted / 2.0) if wanted > 0.0 else contact
         touches = self.state in ("drawing", "landing", "lost", "seeking")
         if touches and wanted > 0.0:
-            self._guard(t, force, across, wanted, speed)
+            self._guard(t, force, across, wanted, friction)
         if self.urgent:
             return self.law.e
         if self.state == "free":

@@ -10,7 +10,7 @@ from dmpcli.admittance.compensation import Compensation
 from dmpcli.admittance.force_coupling import Filter, fast_filter
 from dmpcli.arrays import AnyArray, Floats
 from dmpcli.control import guards
-from dmpcli.control.contact_policy import ContactEvent, ContactPolicy
+from dmpcli.control.contact_policy import ContactEvent, ContactPolicy, course
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.cycle import LoopOutcome, ReadyArm, StopLimits
 from dmpcli.control.force_sensing import Sensing
@@ -39,6 +39,8 @@ SENSOR_RATE = 100.0
 GRAVITY = 9.80665  # m/s²
 AGAIN = 6.0
 """How far a surface is looked for where contact is lost, mm: deeper lies another part."""
+DRIFTED = 0.15
+"""N: a zero that has moved further is told; what noise leaves of one is a fifth of it."""
 # A zero is taken over this time, s.
 ZERO_TIME = 0.5
 
@@ -237,7 +239,7 @@ def coupling_filter(
     Raises
     ------
     InputError
-        The trajectory states no normal, a set-point is too large, or the gains are unstable.
+        The trajectory states no normal, or a set-point is too large.
     """
     if stroke.normal is None:
         raise InputError(
@@ -245,7 +247,6 @@ def coupling_filter(
             "make it anew with generalize"
         )
     settings.setpoint(_largest(stroke))
-    settings.chosen_gains()
     tau = float(facts.get("tau") or stroke.t[-1] - stroke.t[0])
     return fast_filter(tau / settings.speed, settings.period)
 
@@ -288,7 +289,7 @@ def policy_of(
         lookahead,
         settings.stiffness,
         settings.delay,
-        settings.chosen_gains(),
+        settings.chosen_gains(1e-3 * weight / GRAVITY),
         settings.coupling_stiffness,
         settings.coupling_zero_limit,
         settings.min_contact / 100.0,
@@ -296,14 +297,22 @@ def policy_of(
     )
 
 
-def coupling_of(batch: StrokeSelection, settings: ExecuteSettings) -> Filter:
+def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float) -> Filter:
     """Return the filter for all strokes of a run: their time constants differ in no case.
+
+    Parameters
+    ----------
+    batch : StrokeSelection
+    settings : ExecuteSettings
+    weight : float
+        Of what the sensor carries, N.
 
     Raises
     ------
     InputError
-        As `coupling_filter`, for any of them.
+        As `coupling_filter`, for any of them; or the gains are unstable.
     """
+    settings.chosen_gains(1e-3 * weight / GRAVITY)
     filters = [coupling_filter(found.stroke, found.facts, settings) for found in batch.found]
     return filters[0]
 
@@ -350,13 +359,18 @@ def pressed(pressing: ForceTracker) -> str:
             f"; the surface leans from the planned normal by {mean:.1f}° in the mean, {most:.1f}° "
             f"(95 %), friction {found['friction']:.2f}"
         )
-    if pressing.supervisor.wall is not None:
-        said += f"; ended by a wall: {pressing.supervisor.wall}"
+    if pressing.wall is not None:
+        said += f"; ended by a wall: {pressing.wall}"
+    if found.get("zero_drift", 0.0) > DRIFTED:
+        said += (
+            f"; the force's zero has moved by {found['zero_drift']:.2f} N since it was taken, and "
+            "so has the force that was held: calibrate anew, or let the sensor warm up"
+        )
     if found["saturated"]:
         said += f"; at its limits on {100.0 * found['saturated']:.2g} % of the stroke"
     if "oscillating" in {event.state for event in pressing.supervisor.events}:
         said += "; the force swung, and the gains were softened"
-    return said
+    return f"{said}; contact: {course(pressing.supervisor.events)}"
 
 
 def watch(settings: ExecuteSettings) -> StopLimits:

@@ -44,6 +44,8 @@ class Sensing:
     Attributes
     ----------
     info : SensorInfo
+    interval : float
+        From one sample to the next, s.
     newest : Sample
         The last one heard, as sensed.
     """
@@ -54,7 +56,8 @@ class Sensing:
         self._sensor, self.info, self._clock = sensor, info, clock
         # A reading at the share itself is allowed.
         self._limit = np.nextafter(RANGE_SHARE * info.limit, np.inf)
-        self._stale = STALE * max(period, 1.0 / rate)
+        self.interval = 1.0 / rate
+        self._stale = STALE * max(period, self.interval)
         # One sample that the network loses is no silence, however slow the sensor.
         self._silence = max(SILENCE, ONE_LOST / rate)
         self.newest = Sample(clock.now(), 0, np.zeros(6), healthy=True, lost=0)
@@ -141,6 +144,14 @@ class Sensing:
         samples = self.hear(now) or [self.newest]
         return [sample for sample in samples if self._young(sample, now)]
 
+    def rest(self) -> list[Sample]:
+        """Return the healthy samples since the last call, once nothing depends on them any more."""
+        try:
+            samples = self._sensor.poll()
+        except InstrumentError:
+            return []
+        return [one for one in samples if one.healthy and finite(one.wrench)]
+
     def fresh(self, now: float) -> bool:
         """Tell whether the newest sample is young enough to be believed."""
         return self._young(self.newest, now)
@@ -156,6 +167,10 @@ class Sensing:
         return samples
 
     def _check(self, sample: Sample) -> None:
+        wrench = sample.wrench
+        array = isinstance(wrench, np.ndarray) and wrench.shape == (6,)
+        if sample.healthy and array and within(wrench, self._limit):
+            return  # what is not a number is not within
         if not sample.healthy and sample.reason:
             raise InstrumentError(f"force sensor: sample {sample.seq}: {sample.reason}, stopped")
         if not sample.healthy:
@@ -163,20 +178,19 @@ class Sensing:
                 f"force sensor: sample {sample.seq} is saturated or flagged as faulty, stopped; "
                 "use less force, or check range and cable"
             )
-        if not (isinstance(sample.wrench, np.ndarray) and sample.wrench.shape == (6,)):
+        if not array:
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is no array of six, stopped; check its driver"
             )
-        if not finite(sample.wrench):
+        if not finite(wrench):
             raise InstrumentError(
                 f"force sensor: sample {sample.seq} is not a number, stopped; check its driver"
             )
-        if not within(sample.wrench, self._limit):
-            axis = int(np.argmax(np.abs(sample.wrench) >= self._limit))
-            raise InstrumentError(
-                f"force sensor: {_AXES[axis]} = {sample.wrench[axis]:.3g} is over "
-                f"{RANGE_SHARE:.0%} of its range, stopped; use less force"
-            )
+        axis = int(np.argmax(np.abs(wrench) >= self._limit))
+        raise InstrumentError(
+            f"force sensor: {_AXES[axis]} = {wrench[axis]:.3g} is over {RANGE_SHARE:.0%} of its "
+            "range, stopped; use less force"
+        )
 
 
 def _check_sensor(tool: Tool, info: SensorInfo) -> None:

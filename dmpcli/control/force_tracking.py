@@ -1,22 +1,25 @@
 """What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from dmpcli.admittance import force_coupling
 from dmpcli.admittance.force_coupling import Filter
+from dmpcli.admittance.normal_estimation import Vector, dot
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.contact_tally import ContactTally
 from dmpcli.control.force_sensing import Sensing
+from dmpcli.control.met_wall import MetWall, met
 from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
-from dmpcli.instruments.protocols import RobotState
+from dmpcli.instruments.protocols import RobotState, Sample
 from dmpcli.planning.plan import Plan
 
 LONG = 0.15
@@ -24,6 +27,8 @@ LONG = 0.15
 
 # What the tool meets on its way down, before the zero is taken, as a multiple of the set-point.
 _MET = 1.0
+# Readings that are remembered of the cycles before.
+_REMEMBERED = 6
 
 
 class ForceTracker:
@@ -51,6 +56,10 @@ class ForceTracker:
         What was felt on the strokes, with `on` of all of them.
     sense : NormalSense
         The same of the surface's normal.
+    wall : MetWall or None
+        What ended the run, if a wall did and its force was seen to rise.
+    drift : float or None
+        By how much the zero has moved since it was taken, N, where the tool came clear at last.
     """
 
     def __init__(
@@ -70,7 +79,9 @@ class ForceTracker:
         self.tally.begin(plan.id)
         self.sense = NormalSense(plan.period, NormalPolicy()) if sense is None else sense
         self.sense.begin()
-        self._delta = np.zeros(2)
+        self.wall: MetWall | None = None
+        self.drift: float | None = None
+        self._delta = (0.0, 0.0)
         self._zero, self._zeros = np.zeros(3), 0
         self._wanted = _setpoints(plan, supervisor.policy.setpoint, override)
         self._reach = float((plan.position[-1] - plan.position[plan.last]) @ plan.normal[-1])
@@ -126,7 +137,7 @@ class ForceTracker:
             Of the tool, mm; without it nothing is learned of the surface's normal.
         """
         supervisor, plan = self.supervisor, self._plan
-        normal, R = plan.normal_at(index), plan.rotation[min(round(index), len(plan) - 1)]
+        R = plan.rotation[min(round(index), len(plan) - 1)]
         if supervisor.zeroing:
             self._zero = self._zero + R.T @ wrench[:3]
             self._zeros += 1
@@ -134,29 +145,77 @@ class ForceTracker:
             self._zero = self._zero / self._zeros
             self._zeros = 0
             supervisor.zero_is(t, float(np.linalg.norm(self._zero)))
-        felt = wrench[:3] if self._zeros else wrench[:3] - R @ self._zero
+        # In plain floats: arrays of three take ten times as long.
+        across = plan.normal_at(index)
+        planned = _vector(across)
+        fx, fy, fz = felt = _vector(wrench)
+        if not self._zeros:
+            zx, zy, zz = _vector(R @ self._zero)
+            fx, fy, fz = felt = fx - zx, fy - zy, fz - zz
         wanted = self.wanted(index)
         if position is not None and index > plan.lead and supervisor.state == "drawing":
-            self.sense.feel(t, felt, position, normal)
+            self.sense.feel(t, felt, _vector(position), planned)
         else:
             self.sense.lift()
         # The force is held along the surface's own normal, where that is asked for; the tool is
         # displaced along the planned one, so that it draws the plan carried along its normals.
-        normal = self.sense.normal(normal)
-        force = float(normal @ felt)
-        off = felt - force * normal
-        supervisor.step(t, force, float(np.sqrt(off @ off)), wanted, self._speed(index))
+        normal = x, y, z = self.sense.normal(planned)
+        force = dot(felt, normal)
+        side = math.hypot(fx - force * x, fy - force * y, fz - force * z)
+        supervisor.step(t, force, side, wanted, self.sense.friction)
         if index > plan.lead and wanted > 0.0:
             touching = force > min(supervisor.policy.contact, wanted / 2.0)
             self.tally.add(force, wanted, touching and not supervisor.doubted, supervisor.saturated)
         self._delta = force_coupling.follow(self._filter, self._delta, supervisor.e)
-        return self.hold(index)
+        moved: Floats = self._delta[0] * across
+        return moved
 
-    def _speed(self, index: float) -> float:
-        """How fast the plan goes at a set-point's number, mm/s."""
-        x, at = self._plan.position, min(int(index + 1e-9), len(self._plan) - 1)
-        step = x[at] - x[max(at - 1, 0)]
-        return math.sqrt(step @ step) / self._plan.period
+    def look_back(
+        self, index: float, readings: Sequence[tuple[float, Floats]], between: float
+    ) -> None:
+        """Take in what was felt until the arm stood: of a wall, how hard and how stiff it was.
+
+        Parameters
+        ----------
+        index : float
+            Number of the set-point at which it was ended.
+        readings : sequence of tuple
+            Time, s, and wrench as for `displace`, of each reading from just before the end.
+        between : float
+            From one reading to the next, s.
+        """
+        supervisor, plan = self.supervisor, self._plan
+        if supervisor.across is None or self.wall is not None or not readings:
+            return
+        number = min(round(index), len(plan) - 1)
+        normal = np.array(self.sense.normal(_vector(plan.normal_at(index))))
+        zero = plan.rotation[number] @ self._zero
+        felt = [wrench[:3] - zero for _, wrench in readings]
+        sides = [force - float(normal @ force) * normal for force in felt]
+        sizes = [math.sqrt(side @ side) for side in sides]
+        hardest = int(np.argmax(sizes))
+        step = plan.position[number] - plan.position[max(number - 1, 0)]
+        speed = abs(float(step @ sides[hardest])) / (sizes[hardest] * plan.period)
+        times = [t for t, _ in readings]
+        series = list(zip(times, sizes, strict=True))
+        reaction = supervisor.reaction + between
+        self.wall = met(supervisor.across, series, speed, reaction, plan.period)
+        if self.wall is not None:
+            supervisor.failure += f" ({self.wall})"
+
+    def clear(self, readings: Sequence[tuple[float, Floats]], rotation: Floats) -> None:
+        """Take in what is felt where the tool has come clear at last: how far its zero has moved.
+
+        Parameters
+        ----------
+        readings : sequence of tuple
+            Time, s, and wrench as for `displace`, of the last readings.
+        rotation : array, shape (3, 3)
+            Of the tool meanwhile.
+        """
+        if readings and self.supervisor.state == "retreating" and not self._zeros:
+            felt = np.mean([wrench[:3] for _, wrench in readings], axis=0)
+            self.drift = float(np.linalg.norm(rotation.T @ felt - self._zero))
 
     def come(self, index: float, wrench: Floats | None, t: float) -> Floats:
         """Return what to add on the way to the stroke: it ends over the plan, by the reach.
@@ -256,8 +315,10 @@ class ForceTracker:
         if not found:
             return {"contact_events": events}
         found |= {"landing_peak": supervisor.landing_peak} | self.sense.facts()
-        if supervisor.wall is not None:
-            found["wall"] = asdict(supervisor.wall) | {"unavoidable": supervisor.wall.unavoidable}
+        if self.wall is not None:
+            found["wall"] = asdict(self.wall) | {"unavoidable": self.wall.unavoidable}
+        if self.drift is not None:
+            found["zero_drift"] = self.drift
         for name in ("stiffness", "delay"):
             if getattr(supervisor, name) is not None:
                 found[name] = getattr(supervisor, name)
@@ -270,6 +331,12 @@ class ForceTracker:
             return {}
         found = {"mass": known.mass, "damping": known.damping}
         return found if np.isinf(known.integral) else found | {"integral_time": known.integral}
+
+
+def _vector(array: Floats) -> Vector:
+    """The first three numbers of an array."""
+    x, y, z = array[:3].tolist()
+    return x, y, z
 
 
 def _setpoints(plan: Plan, setpoint: float, override: float | None) -> Floats:
@@ -318,6 +385,7 @@ class ForceInput:
     sensing: Sensing
     compensate: Callable[[Floats, Floats], Floats]
     pressing: ForceTracker | None = None
+    _heard: deque[Sample] = field(default_factory=lambda: deque(maxlen=_REMEMBERED), repr=False)
 
     def feel(
         self, state: RobotState, now: float, force: float = np.inf, torque: float = np.inf
@@ -348,6 +416,7 @@ class ForceInput:
         samples = self.sensing.recent(now)
         if not samples:
             return None
+        self._heard.extend(samples)
         # Not np.mean, which takes ten times as long for one or two.
         sensed = samples[0].wrench
         for sample in samples[1:]:
@@ -355,3 +424,19 @@ class ForceInput:
         wrench = self.compensate(sensed / len(samples), state.rotation)
         guards.check_wrench(wrench, force, torque)
         return wrench
+
+    def look_back(self, rotation: Floats) -> list[tuple[float, Floats]]:
+        """Return what was felt reading by reading, from some cycles ago to now, as far as it came.
+
+        Parameters
+        ----------
+        rotation : array, shape (3, 3)
+            Of the tool meanwhile.
+
+        Returns
+        -------
+        list of tuple
+            Time, s, and wrench on the tool, shape (6,), at the TCP, base axes.
+        """
+        readings = [*self._heard, *self.sensing.rest()]
+        return [(one.t, self.compensate(one.wrench, rotation)) for one in readings]

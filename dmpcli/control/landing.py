@@ -15,6 +15,9 @@ from dmpcli.control.guarded_motion import sinking, towards
 # they lie apart already.
 _STOPS, _APART, _BACK = 0.35, 0.2, 0.55
 _PRESSES = 0.8
+# N by which the force must have risen on the way in, or that share of a set-point below 1 N: of
+# less the noise of a reading makes any slope.
+_RISE = 0.35
 # A surface so soft that it is none, N/mm.
 SOFTEST = 0.05
 # The way from one resting point to the other is no longer, mm.
@@ -116,7 +119,8 @@ class Landing:
         pressed = depth - first[0]
         if pressed > 2.0 and force - first[1] < SOFTEST * pressed:
             self.failure = f"{force:.2f} N that do not rise over {pressed:.1f} mm of displacement"
-        if force >= _STOPS * self._wanted and len(self._ramp) >= 3:
+        risen = force - first[1] >= _RISE * min(self._wanted, 1.0)
+        if force >= _STOPS * self._wanted and risen and len(self._ramp) >= 3:
             self._fit = line([d for d, _ in self._ramp], [f for _, f in self._ramp])
             self._rest()
             return LawState(state.e)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmpcli.admittance.normal_estimation import NormalEstimator, carried, turned
+from dmpcli.admittance.normal_estimation import NormalEstimator, Vector, carried, turned
 from dmpcli.arrays import Floats
 
 # Over so many cycles the tool's own velocity is taken.
@@ -41,40 +41,45 @@ class NormalSense:
     period : float
         s.
     policy : NormalPolicy
-
-    Attributes
-    ----------
-    estimate : array, shape (3,), or None
-        Unit vector, base axes; None where nothing is known.
     """
 
     def __init__(self, period: float, policy: NormalPolicy) -> None:
         self._period, self._policy = period, policy
         self._estimator = NormalEstimator(period)
-        self._way: deque[tuple[float, Floats]] = deque(maxlen=_WINDOW + 1)
-        self._used: Floats | None = None
-        self._planned = np.zeros(3)
+        self._way: deque[tuple[float, Vector]] = deque(maxlen=_WINDOW + 1)
+        self._found: Vector | None = None
+        self._used: Vector | None = None
+        self._planned: Vector = (0.0, 0.0, 1.0)
         self._angles: list[float] = []
-        self.estimate: Floats | None = None
+
+    @property
+    def estimate(self) -> Floats | None:
+        """Unit normal, shape (3,), base axes; None where nothing is known."""
+        return None if self._found is None else np.array(self._found)
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient; 0 where it was not felt yet."""
+        return 0.0 if self._found is None else self._estimator.friction
 
     def begin(self) -> None:
         """Get ready for the next stroke: of the surface elsewhere only its friction is known."""
         self._estimator = NormalEstimator(self._period, self._estimator.friction)
         self._way.clear()
-        self._used = self.estimate = None
+        self._used = self._found = None
 
-    def feel(self, t: float, force: Floats, position: Floats, planned: Floats) -> None:
+    def feel(self, t: float, force: Vector, position: Vector, planned: Vector) -> None:
         """Take in one cycle of the stroke in contact.
 
         Parameters
         ----------
         t : float
             s.
-        force : array, shape (3,)
+        force : tuple of float
             On the tool, its zero taken off, base axes, N.
-        position : array, shape (3,)
+        position : tuple of float
             Of the tool, as the arm tells it, mm.
-        planned : array, shape (3,)
+        planned : tuple of float
             Unit normal.
         """
         way = self._way
@@ -82,9 +87,10 @@ class NormalSense:
         since, before = way[0]
         if len(way) <= _WINDOW or t <= since:
             return
-        told = self._estimator.feel(force, (position - before) / (t - since), planned)
+        T, (x, y, z), (u, v, w) = t - since, position, before
+        told = self._estimator.feel(force, ((x - u) / T, (y - v) / T, (z - w) / T), planned)
         if self._estimator.heard >= _BELIEVED:
-            self.estimate = self._estimator.normal
+            self._found = self._estimator.normal
             if told:
                 self._angles.append(self._estimator.angle)
 
@@ -92,17 +98,17 @@ class NormalSense:
         """Say that the tool is lifted, or does not press."""
         self._way.clear()
 
-    def normal(self, planned: Floats) -> Floats:
-        """Return the normal along which the force is held, shape (3,)."""
+    def normal(self, planned: Vector) -> Vector:
+        """Return the normal along which the force is held."""
         policy = self._policy
-        if not policy.used or self.estimate is None:
+        if not policy.used or self._found is None:
             return planned
         now = planned
         if self._used is not None:
             # The planned normal turns with the surface; the rate is that of the lean from it.
             now = carried(self._used, self._planned, planned)
         step = policy.rate * self._period
-        self._used = turned(now, self.estimate, planned, policy.angle, step)
+        self._used = turned(now, self._found, planned, policy.angle, step)
         self._planned = planned
         return self._used
 

@@ -140,7 +140,7 @@ class PlanLoop(ControlLoop):
         how, failure = self._run()
         if self._cursor.braking:
             how = how or "decelerated along the path"
-        failure = failure or self._untouched()
+        failure = self._seen_back(failure) or self._untouched()
         outcome = self._outcome(how, failure, DONE)
         if self._outputs is None or not self._outputs.left:
             return outcome
@@ -150,6 +150,19 @@ class PlanLoop(ControlLoop):
     def _leave(self) -> None:
         if self._outputs is not None:
             self._outputs.leave()
+
+    def _seen_back(self, failure: DmpError | None) -> DmpError | None:
+        """Return the failure; where a wall ended it, with what was felt until the arm stood."""
+        pressing, touch, last = self.pressing, self._touch, self._last
+        if pressing is None or touch is None or last is None:
+            return failure
+        if failure is None and self._rested:
+            pressing.clear(touch.look_back(last[1]), last[1])
+        if pressing.supervisor.across is None or str(failure) != pressing.failure:
+            return failure
+        readings = touch.look_back(last[1])
+        pressing.look_back(self._cursor.index, readings, touch.sensing.interval)
+        return RefusedError(pressing.failure)
 
     def _untouched(self) -> DmpError | None:
         """Return why what was drawn does not count, though nothing else went wrong."""

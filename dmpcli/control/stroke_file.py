@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from dmpcli.records import file_io, record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Record
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import Location, located
 from dmpcli.records.trajectory_reader import rows_by_id, stored
 
 NAMED = 5
@@ -87,15 +87,15 @@ def find(path: str | Source, wanted: Sequence[str] = ()) -> StrokeSelection:
     twice = [name for i, name in enumerate(wanted) if name in wanted[:i]]
     if twice:
         raise InputError(f"--id {twice[0]}: is given twice; a stroke is drawn once in a run")
-    if isinstance(path, str) and path != file_io.DASH and Path(path).is_dir():
-        return _in_folder(Path(path), wanted)
+    if isinstance(path, str) and path != file_io.DASH and (folder := located(path)).is_dir():
+        return _in_folder(folder, wanted)
     source, rows = _grouped(path)
     names = _chosen(wanted, list(rows), source.name)
     found = tuple(_found(source, name, rows[name], {}) for name in names)
     return StrokeSelection(found, {}, (record.input_of("trajectory", source),), False)
 
 
-def _in_folder(folder: Path, wanted: Sequence[str]) -> StrokeSelection:
+def _in_folder(folder: Location, wanted: Sequence[str]) -> StrokeSelection:
     pairs = record.decode(file_io.read_table(folder), schemas.PAIRS)
     ids = [str(name) for name in pairs.columns["id"]]
     parts = pairs.columns.get("part", np.full(len(pairs), None))

@@ -8,7 +8,7 @@ from dmpcli.arrays import Floats
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactMeasures:
     """Force along the surface normal.
 
     Attributes
@@ -28,7 +28,7 @@ class Contact:
     threshold: float
 
 
-def contact(force: Floats, threshold: float) -> Contact:
+def contact(force: Floats, threshold: float) -> ContactMeasures:
     """Return how a tool pressed.
 
     Parameters
@@ -38,7 +38,7 @@ def contact(force: Floats, threshold: float) -> Contact:
     threshold : float
         N; less is no contact.
     """
-    return Contact(
+    return ContactMeasures(
         float(np.min(force)),
         float(np.mean(force)),
         float(np.max(force)),

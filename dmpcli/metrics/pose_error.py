@@ -42,7 +42,7 @@ class PoseErrors:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class RigidAlignment:
     """The similarity that brings an estimate nearest to a reference: scale R x + position.
 
     Attributes
@@ -99,7 +99,7 @@ def _nearest(few: Floats, many: Floats, most: float) -> tuple[Integers, Integers
     return found, np.asarray(chosen[found])
 
 
-def alignment(reference: Floats, estimate: Floats, scaled: bool = False) -> Alignment | None:
+def alignment(reference: Floats, estimate: Floats, scaled: bool = False) -> RigidAlignment | None:
     """Return the motion of space that brings points nearest to others in the mean square [2].
 
     Parameters
@@ -111,7 +111,7 @@ def alignment(reference: Floats, estimate: Floats, scaled: bool = False) -> Alig
 
     Returns
     -------
-    Alignment or None
+    RigidAlignment or None
         None where many are as good: fewer than three points, or points on one line.
     """
     if len(reference) < _LEAST:
@@ -124,7 +124,7 @@ def alignment(reference: Floats, estimate: Floats, scaled: bool = False) -> Alig
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(V))])
     R = (U * sign) @ V
     scale = float((size * sign).sum() / np.mean((b * b).sum(axis=1))) if scaled else 1.0
-    return Alignment(Pose(there - scale * (R @ here), R), scale)
+    return RigidAlignment(Pose(there - scale * (R @ here), R), scale)
 
 
 def absolute(reference: Trajectory, estimate: Trajectory) -> PoseErrors:

@@ -2,17 +2,17 @@
 
 import contextlib
 import io
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
 from dmpcli.errors import InputError
-from dmpcli.records import file_io
+from dmpcli.records.draft import Draft
+from dmpcli.records.storage import Location
 
 
 @contextlib.contextmanager
-def growing(folder: Path, names: Sequence[str]) -> Iterator[list[TextIO]]:
+def growing(folder: Location, names: Sequence[str]) -> Iterator[list[TextIO]]:
     """Open text files in a folder that is made if need be; an error leaves nothing behind.
 
     Yields
@@ -25,34 +25,41 @@ def growing(folder: Path, names: Sequence[str]) -> Iterator[list[TextIO]]:
     InputError
         The folder cannot be made, or a file not be written.
     """
-    made = _make(folder)
-    files: dict[str, Path] = {}
+    made = _make(folder) if isinstance(folder, Path) else []
+    files: list[Draft] = []
     whole = False
     try:
         with contextlib.ExitStack() as stack:
             streams: list[TextIO] = []
             for name in names:
-                files[name], raw = file_io.temporary_of(folder / name)
-                text = io.TextIOWrapper(raw, encoding="utf-8", newline="")
-                streams.append(stack.enter_context(text))
+                draft = Draft(folder / name)
+                files.append(draft)
+                text = io.TextIOWrapper(draft.stream, encoding="utf-8", newline="")
+                streams.append(text)
+                stack.callback(_let_go, text)
             yield streams
-            for stream in streams:
+            for stream, draft in zip(streams, files, strict=True):
                 stream.flush()
-                os.fsync(stream.fileno())
-        for name, file in files.items():
-            file.replace(folder / name)
+                draft.settle()
+        for draft in files:
+            draft.keep()
         whole = True
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
         raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
     finally:
-        for file in files.values():
-            with contextlib.suppress(OSError):
-                file.unlink()
+        for draft in files:
+            draft.drop()
         for place in [] if whole else made:
             with contextlib.suppress(OSError):
                 place.rmdir()
+
+
+def _let_go(text: io.TextIOWrapper) -> None:
+    """Leave the file open that a text is written into."""
+    with contextlib.suppress(OSError, ValueError):
+        text.detach()
 
 
 def _make(folder: Path) -> list[Path]:

@@ -1,9 +1,9 @@
 """A batch read part by part: its table of pairs, and the trajectories of one part at a time."""
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,15 @@ from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
 from dmpcli.records.columns import check_ids, columns_of
 from dmpcli.records.file_io import Source
+from dmpcli.records.object_store import ObjectPath
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import DRAWN_ON, NORMAL, OK, Column, Schema
+from dmpcli.records.storage import Location
 from dmpcli.records.trajectory_reader import unit_normals
+
+_AT_ONCE = 16
+"""Parts of a batch in a store that are asked at once."""
 
 AGAIN = "the command that draws it goes on from the parts that are there"
 
@@ -29,7 +34,7 @@ class BatchFolder:
 
     Attributes
     ----------
-    folder : Path
+    folder : Path or ObjectPath
     sha256 : str
         Of the table.
     provenance : Provenance
@@ -49,7 +54,7 @@ class BatchFolder:
         Ids of all pairs.
     """
 
-    folder: Path
+    folder: Location
     sha256: str
     provenance: Provenance
     ids: Any
@@ -122,7 +127,7 @@ def part_of(batch: BatchFolder, part: int) -> BatchFolder:
     )
 
 
-def read(folder: Path) -> tuple[BatchFolder, list[str]]:
+def read(folder: Location) -> tuple[BatchFolder, list[str]]:
     """Read the table of a finished batch, and check what its parts say of themselves.
 
     Returns
@@ -139,17 +144,21 @@ def read(folder: Path) -> tuple[BatchFolder, list[str]]:
     source = file_io.read_table(folder)
     batch = _table(folder, source)
     odd = _compared(batch)
-    for file in batch.files:
-        _footer(batch, file)
+    if isinstance(folder, ObjectPath):  # each takes its time to answer, and none waits for another
+        with ThreadPoolExecutor(_AT_ONCE) as asking:
+            list(asking.map(lambda file: _footer(batch, file), batch.files))
+    else:
+        for file in batch.files:
+            _footer(batch, file)
     return batch, odd
 
 
-def _table(folder: Path, source: Source) -> BatchFolder:
+def _table(folder: Location, source: Source) -> BatchFolder:
     with untrusted.decoding(source.name):
         return _decoded(folder, source)
 
 
-def _decoded(folder: Path, source: Source) -> BatchFolder:
+def _decoded(folder: Location, source: Source) -> BatchFolder:
     table = parquet.table(source)
     provenance = _provenance(table.schema.metadata, schemas.PAIRS, source.name)
     named = schemas.PAIRS.columns
@@ -264,16 +273,16 @@ def _compared(batch: BatchFolder) -> list[str]:
         raise InputError(
             f"{path}: lists {lost[0]}, of which {file_io.TABLE} knows nothing; draw the batch again"
         )
+    there = file_io.parts_of(batch.folder)
     for entry in found.parts:
         part = file_io.part_in(batch.folder, entry.file, str(path))
-        size = part.stat().st_size if part.is_file() else None
+        size = there[entry.file].st_size if entry.file in there else None
         if size is not None and size != entry.bytes:
             raise InputError(
                 f"{part}: has {size} bytes, {file_io.MANIFEST} says {entry.bytes}: it is damaged "
                 "or of another batch; draw the batch again"
             )
-    there = set(file_io.parts_of(batch.folder))
-    more = sorted(there - listed)
+    more = sorted(set(there) - listed)
     if not more:
         return []
     others = f" and {len(more) - 1} more" if len(more) > 1 else ""

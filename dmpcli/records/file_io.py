@@ -10,13 +10,15 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
 
 from dmpcli.errors import InputError
+from dmpcli.records.object_store import ObjectPath
+from dmpcli.records.storage import Location, Stat, Stats, located
 
 DASH = "-"
 
@@ -46,12 +48,12 @@ class Source:
         return io.BytesIO(self.content)
 
 
-def read(path: str | Path, journal: bool = False) -> Source:
+def read(path: str | Location, journal: bool = False) -> Source:
     """Read one input whole; ``-`` is standard input.
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or ObjectPath
     journal : bool
         Whether it may be a journal, which only `recover` reads.
 
@@ -65,7 +67,9 @@ def read(path: str | Path, journal: bool = False) -> Source:
             raise InputError("standard input: is closed; name a file")
         source = Source(shown(path), _limited(shown(path), sys.stdin.buffer, journal))
     else:
-        file = Path(path)
+        file = located(path)
+        if isinstance(file, ObjectPath) and file.is_file():
+            return _checked(_fetched(file), path, journal)
         if file.is_dir():
             raise InputError(f"{path}: is a directory, a file is needed here")
         try:
@@ -78,6 +82,19 @@ def read(path: str | Path, journal: bool = False) -> Source:
             raise InputError(f"{path}: no such file; check the name") from None
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    return _checked(source, path, journal)
+
+
+def _fetched(file: ObjectPath) -> Source:
+    """Read an object; journals lie on the machine that wrote them."""
+    size = file.stat().st_size
+    if size > LARGEST:
+        raise _too_large(str(file), f"{size / 2**30:.1f} GiB")
+    return Source(str(file), file.read_bytes())
+
+
+def _checked(source: Source, path: str | Location, journal: bool) -> Source:
+    """Return an input, unless it is empty or a journal."""
     if not source.content:
         raise InputError(f"{source.name}: is empty; the command that made it may have failed")
     if not journal and (source.name.endswith(JOURNAL) or source.content[:4] == _ARROW_STREAM):
@@ -105,7 +122,7 @@ def _too_large(name: str, size: str) -> InputError:
     )
 
 
-def shown(path: str | Path, output: bool = False) -> str:
+def shown(path: str | Location, output: bool = False) -> str:
     """Return what messages call a file name; ``-`` is standard input or output."""
     if str(path) != DASH:
         return str(path)
@@ -133,8 +150,14 @@ def say(content: bytes) -> None:
         raise InputError(f"standard output: cannot be written: {error.strerror}") from None
 
 
-def check_writable(path: str | Path) -> None:
+def check_writable(path: str | Location, here: bool = False) -> None:
     """Refuse an output that could not be written, before any work is done.
+
+    Parameters
+    ----------
+    path : str, Path or ObjectPath
+    here : bool
+        Whether it must be of this machine: what an instrument said is not trusted to a network.
 
     Raises
     ------
@@ -147,9 +170,13 @@ def check_writable(path: str | Path) -> None:
         if sys.stdout.isatty():
             raise InputError("-o -: would write a file to the terminal; redirect or name a file")
         return
-    file = Path(path)
+    file = located(path)
+    if here and isinstance(file, ObjectPath):
+        raise _not_here(file)
     if file.is_dir():
         raise InputError(f"{path}: is a directory, the output needs a file name")
+    if isinstance(file, ObjectPath):
+        return
     folder = file.parent
     if not folder.is_dir():
         raise InputError(f"{path}: the folder {folder} does not exist; make it first")
@@ -157,7 +184,7 @@ def check_writable(path: str | Path) -> None:
         raise InputError(f"{path}: the folder {folder} is not writable")
 
 
-def write(path: str | Path, content: bytes) -> None:
+def write(path: str | Location, content: bytes) -> None:
     """Write one output whole, or not at all; ``-`` is standard output.
 
     Raises
@@ -168,7 +195,7 @@ def write(path: str | Path, content: bytes) -> None:
     write_by(path, lambda stream: stream.write(content))
 
 
-def write_by(path: str | Path, fill: Callable[[BinaryIO], object]) -> None:
+def write_by(path: str | Location, fill: Callable[[BinaryIO], object]) -> None:
     """Write one output whole, or not at all, by a function that fills an open file.
 
     Raises
@@ -176,19 +203,25 @@ def write_by(path: str | Path, fill: Callable[[BinaryIO], object]) -> None:
     InputError
         The output cannot be written (no space, no right).
     """
-    special = str(path) != DASH and Path(path).exists() and not Path(path).is_file()
+    place = located(path)
+    if isinstance(place, ObjectPath):
+        whole = io.BytesIO()
+        fill(whole)
+        place.put(whole.getbuffer())
+        return
+    special = str(path) != DASH and place.exists() and not place.is_file()
     if str(path) == DASH or special:
         whole = io.BytesIO()
         if special:
             check_writable(path)
         fill(whole)
         if special:
-            _write_special(_meant(path), whole.getvalue())
+            _write_special(_meant(place), whole.getvalue())
         else:
             say(whole.getvalue())
         return
     check_writable(path)
-    file = _meant(path)
+    file = _meant(place)
     with _written(path, file, fill) as temporary:
         temporary.replace(file)
 
@@ -210,7 +243,7 @@ def write_new(path: str | Path, content: bytes) -> Path:
     if str(path) == DASH:
         say(content)
         return Path(DASH)
-    check_writable(path)
+    check_writable(path, here=True)
     file = _meant(path)
     if file.exists() and not file.is_file():
         _write_special(file, content)
@@ -225,6 +258,13 @@ def write_new(path: str | Path, content: bytes) -> Path:
             else:
                 return file
     raise AssertionError  # pragma: no cover
+
+
+def _not_here(path: ObjectPath) -> InputError:
+    return InputError(
+        f"{path}: what cannot be made again is written on this machine, and a store could replace "
+        "what has its name; name a file here, and copy it"
+    )
 
 
 def _meant(path: str | Path) -> Path:
@@ -249,7 +289,9 @@ def temporary_of(file: Path) -> tuple[Path, BinaryIO]:
 
 
 @contextlib.contextmanager
-def _written(path: str | Path, file: Path, fill: Callable[[BinaryIO], object]) -> Iterator[Path]:
+def _written(
+    path: str | Location, file: Path, fill: Callable[[BinaryIO], object]
+) -> Iterator[Path]:
     """Write a temporary file whole, for the caller to name; what is left of it goes."""
     temporary: Path | None = None
     try:
@@ -315,16 +357,24 @@ def part_name(number: int, nested: bool) -> str:
     return f"part-{number // MOST_IN_FOLDER:02d}/{name}" if nested else name
 
 
-def parts_of(folder: Path) -> dict[str, os.stat_result]:
+def parts_of(folder: Location) -> Stats:
     """Return the names of what looks like parts of a batch, with size and time of each.
 
     Raises
     ------
     OSError
     """
-    found: dict[str, os.stat_result] = {}
+    found: dict[str, Stat] = {}
     for inner in part_folders(folder):
         prefix = "" if inner == folder else f"{inner.name}/"
+        if isinstance(inner, ObjectPath):
+            listed = inner.entries()
+            found |= {
+                prefix + one.name: one.known
+                for one in listed
+                if _PART_FILE.fullmatch(one.name) and not one.folder
+            }
+            continue
         with os.scandir(inner) as entries:
             for entry in entries:
                 if _PART_FILE.fullmatch(entry.name) and entry.is_file():
@@ -332,19 +382,23 @@ def parts_of(folder: Path) -> dict[str, os.stat_result]:
     return dict(sorted(found.items()))
 
 
-def part_folders(folder: Path) -> list[Path]:
+def part_folders(folder: Location) -> Sequence[Location]:
     """Return the folders that parts of a batch may lie in: its own, and those in it.
 
     Raises
     ------
     OSError
     """
-    with os.scandir(folder) as entries:
-        inner = [e.name for e in entries if _PART_FOLDER.fullmatch(e.name) and e.is_dir()]
+    if isinstance(folder, ObjectPath):
+        inner = [one.name for one in folder.entries() if one.folder]
+        inner = [name for name in inner if _PART_FOLDER.fullmatch(name)]
+    else:
+        with os.scandir(folder) as entries:
+            inner = [e.name for e in entries if _PART_FOLDER.fullmatch(e.name) and e.is_dir()]
     return [folder, *(folder / name for name in sorted(inner))]
 
 
-def part_in(folder: str | Path, name: str, by: str) -> Path:
+def part_in(folder: str | Location, name: str, by: str) -> Location:
     """Return the file of a part of a batch, which a table or manifest names.
 
     Parameters
@@ -366,10 +420,10 @@ def part_in(folder: str | Path, name: str, by: str) -> Path:
             f"{by}: names the part {name!r}, and parts are called part-00000.parquet and so on; "
             "draw the batch again"
         )
-    return Path(folder) / name
+    return located(folder) / name
 
 
-def check_folder(path: str | Path) -> None:
+def check_folder(path: str | Location) -> None:
     """Refuse a dataset folder that could not be written, before any work is done.
 
     Raises
@@ -377,11 +431,13 @@ def check_folder(path: str | Path) -> None:
     InputError
         The name is a file's or ``-``, or its parent is missing or not writable.
     """
-    folder = Path(path)
+    folder = located(path)
     if str(path) == DASH:
         raise InputError("-o -: many trajectories need a folder, not standard output")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{path}: is a file; many trajectories need a folder")
+    if isinstance(folder, ObjectPath):
+        return
     place = folder if folder.is_dir() else folder.absolute().parent
     if not place.is_dir():
         raise InputError(f"{path}: the folder {folder.parent} does not exist; make it first")
@@ -389,7 +445,7 @@ def check_folder(path: str | Path) -> None:
         raise InputError(f"{path}: the folder {place} is not writable")
 
 
-def read_table(folder: str | Path) -> Source:
+def read_table(folder: str | Location) -> Source:
     """Read the table of pairs of a finished batch.
 
     Raises
@@ -397,9 +453,10 @@ def read_table(folder: str | Path) -> Source:
     InputError
         The folder holds no batch, or one that is not finished.
     """
-    if not (Path(folder) / TABLE).is_file():
+    table = located(folder) / TABLE
+    if not table.is_file():
         raise InputError(
             f"{folder}: holds no finished batch ({TABLE} is missing); the command that draws it "
             "goes on from the parts that are there"
         )
-    return read(Path(folder) / TABLE)
+    return read(table)

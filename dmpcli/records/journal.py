@@ -277,7 +277,7 @@ def _checksum(flat: Iterable[Floats], words: Iterable[Sequence[str]]) -> int:
 
 
 @dataclass(frozen=True)
-class Found:
+class JournalContent:
     """What a journal holds.
 
     Attributes
@@ -301,7 +301,7 @@ class Found:
 
 
 @decoder
-def read(source: Source) -> Found:
+def read(source: Source) -> JournalContent:
     """Read a journal, wherever it breaks off.
 
     Raises
@@ -335,7 +335,7 @@ def read(source: Source) -> Found:
             "nothing to recover"
         )
     unread = 0 if whole else len(source.content) - read_to
-    return Found(SCHEMAS[header["schema"]], provenance, rows, whole, unread)
+    return JournalContent(SCHEMAS[header["schema"]], provenance, rows, whole, unread)
 
 
 def _opened(reader: Any, name: str) -> tuple[dict[str, Any], Any]:

@@ -155,14 +155,21 @@ def description(source: Source) -> dict[str, Any]:
 
 def as_options(patch: "Patch") -> str:
     """Return where there is room for a stroke, as options of ``generalize`` say it."""
+    return f"{ends_as_options(patch)}  {what(patch)}"
 
-    def said(point: Floats, digits: int = 1) -> str:
-        return " ".join(f"{value:.10g}" for value in np.round(point, digits) + 0.0)
 
-    return (
-        f"--start {said(patch.start)} --goal {said(patch.goal)}  ({patch.area:.4g} mm², normal "
-        f"{said(patch.normal, 2)})"
-    )
+def ends_as_options(patch: "Patch") -> str:
+    """Return start and goal as options of ``generalize`` say them."""
+    return f"--start {_said(patch.start)} --goal {_said(patch.goal)}"
+
+
+def what(patch: "Patch") -> str:
+    """Return size and normal of a patch in words."""
+    return f"({patch.area:.4g} mm², normal {_said(patch.normal, 2)})"
+
+
+def _said(point: Floats, digits: int = 1) -> str:
+    return " ".join(f"{value:.10g}" for value in np.round(point, digits) + 0.0)
 
 
 def _likely_unit(size: float) -> str | None:

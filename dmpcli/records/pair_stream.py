@@ -8,16 +8,15 @@ import hashlib
 import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, pairs, parquet, schemas, tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import PairTable
+from dmpcli.records.storage import Location
 
 STREAMED = 64 * 2**20
 """Bytes of a text from which on it is read in pieces."""
@@ -39,14 +38,14 @@ class PairStream:
 
     Attributes
     ----------
-    path : Path
+    path : Path or ObjectPath
     sha256 : str
     rows : int
         How many it has; of a text, at most.
     parquet : bool
     """
 
-    path: Path
+    path: Location
     sha256: str
     rows: int
     parquet: bool
@@ -187,7 +186,7 @@ def _further(text: str, lines: int) -> str:
     return re.sub(r"\bline (\d+)", lambda found: f"line {int(found[1]) + lines}", text)
 
 
-def opened(path: Path) -> PairStream | None:
+def opened(path: Location) -> PairStream | None:
     """Return a table that is to be read in pieces; None where it had better be read whole.
 
     Raises
@@ -203,7 +202,7 @@ def opened(path: Path) -> PairStream | None:
             packed = stream.read(4) == parquet.MAGIC
         if packed:
             with untrusted.decoding(str(path)):
-                rows = pq.read_metadata(path).num_rows
+                rows = parquet.footer(path).num_rows
             if rows <= STREAMED_ROWS:
                 return None
         elif size <= STREAMED:
@@ -222,7 +221,7 @@ def opened(path: Path) -> PairStream | None:
     return PairStream(path, sha256.hexdigest(), rows if packed else ends, packed)
 
 
-def _cut(path: Path, rows: int) -> Iterator[tuple[bytes, bytes]]:
+def _cut(path: Location, rows: int) -> Iterator[tuple[bytes, bytes]]:
     """Yield the lines before the rows of a text, and so many more lines each time."""
     with path.open("rb") as stream:
         head = b""

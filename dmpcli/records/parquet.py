@@ -4,7 +4,6 @@ Files that hold no checksums (of other programs, and of version 0.1.0) are read 
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -13,6 +12,8 @@ import pyarrow.parquet as pq
 from dmpcli.errors import InputError
 from dmpcli.records import untrusted
 from dmpcli.records.file_io import Source
+from dmpcli.records.object_store import ObjectPath
+from dmpcli.records.storage import Location
 
 MAGIC = b"PAR1"
 
@@ -25,12 +26,12 @@ _ROWS = 4096
 _FAULTS = (pa.ArrowException, OSError, ValueError, MemoryError)
 
 
-def opened(source: Source | Path, remedy: str, text: Sequence[str] | None = None) -> Any:
+def opened(source: Source | Location, remedy: str, text: Sequence[str] | None = None) -> Any:
     """Open a Parquet file whose columns may be read.
 
     Parameters
     ----------
-    source : Source or Path
+    source : Source, Path or ObjectPath
     remedy : str
         What to do about a damaged file.
     text : sequence of str, optional
@@ -67,8 +68,21 @@ def damaged(name: str, remedy: str) -> InputError:
     return InputError(f"{name}: is not a Parquet file, or it is truncated or damaged; {remedy}")
 
 
-def _file(source: Source | Path) -> Any:
+def _file(source: Source | Location) -> Any:
+    if isinstance(source, ObjectPath):
+        return source.open("rb")
     return source.open() if isinstance(source, Source) else source
+
+
+def footer(path: Location) -> Any:
+    """Return the metadata of a file: rows, row groups, and what its writer says.
+
+    Raises
+    ------
+    pyarrow.ArrowException, OSError
+        It is missing, or no Parquet file.
+    """
+    return pq.read_metadata(_file(path))
 
 
 def table(source: Source) -> Any:

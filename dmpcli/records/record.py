@@ -3,9 +3,8 @@
 import contextlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,6 +18,7 @@ from dmpcli.records.columns import TYPES, columns_of, dtype_of
 from dmpcli.records.file_io import TABLE, Source, parts_of
 from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
+from dmpcli.records.storage import Location
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 from dmpcli.version import __version__
@@ -447,15 +447,22 @@ def _may_be_ours(stream: BinaryIO) -> bool:
     return b"\x18" + bytes([len(KEY)]) + KEY in stream.read(size)
 
 
-def foreign_parts(folder: Path) -> list[str]:
+def foreign_parts(folder: Location, known: Collection[str] = ()) -> list[str]:
     """Names of files in a dataset folder that stand where ours would, but are not ours.
 
     A damaged Parquet file, or an empty one, counts as ours: a power cut can leave such parts.
+
+    Parameters
+    ----------
+    folder : Path or ObjectPath
+    known : collection of str
+        Names that are known to be ours.
     """
     foreign = []
     names = sorted([*parts_of(folder), TABLE]) if folder.is_dir() else []
-    for file in (folder / name for name in names):
-        if not file.is_file():
+    for name in names:
+        file = folder / name
+        if name in known or not file.is_file():
             continue
         try:
             with file.open("rb") as stream:
@@ -463,5 +470,5 @@ def foreign_parts(folder: Path) -> list[str]:
         except OSError as error:
             raise InputError(f"{file}: cannot be read: {error.strerror}") from None
         if not ours:
-            foreign.append(file.relative_to(folder).as_posix())
+            foreign.append(name)
     return foreign

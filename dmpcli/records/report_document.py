@@ -131,6 +131,7 @@ class Contact(JsonPart):
     largest: float
     absent: Share
     threshold: float
+    unknown: Annotated[Share, Field(description="of what was drawn, without a known force")] = 0.0
 
 
 class Summary(JsonPart):

@@ -1,22 +1,22 @@
 """Names of outputs: a file is never written under the suffix of another kind."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from dmpcli.errors import InputError
 from dmpcli.records.file_io import DASH
+from dmpcli.records.storage import Location, located
 
 PARQUET: Mapping[str, tuple[str, ...]] = {"Parquet": (".parquet", ".pq")}
 JSON: Mapping[str, tuple[str, ...]] = {"JSON": (".json",)}
 CSV: Mapping[str, tuple[str, ...]] = {"CSV": (".csv", ".txt")}
 
 
-def check(path: str | Path, kind: Mapping[str, tuple[str, ...]]) -> None:
+def check(path: str | Location, kind: Mapping[str, tuple[str, ...]]) -> None:
     """Refuse an output whose suffix is not one of its kind; no suffix will do.
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or ObjectPath
         ``-`` and devices have none.
     kind : mapping of str to tuple of str
         One of those above.
@@ -26,7 +26,8 @@ def check(path: str | Path, kind: Mapping[str, tuple[str, ...]]) -> None:
     InputError
     """
     [(word, wanted)] = kind.items()
-    suffix, stem = Path(path).suffix, Path(path).stem
+    place = located(path)
+    suffix, stem = place.suffix, place.stem
     if str(path) == DASH or not suffix or suffix.lower() in wanted:
         return
     text = f"-o {path}: this command writes {word}, and {suffix!r} is not its suffix; name it "

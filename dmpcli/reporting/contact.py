@@ -23,20 +23,24 @@ def contact_of(run: Record) -> Row | None:
     """Force along the normal while a run drew; None where nothing was felt.
 
     A force coupling has said it itself. Of other runs the normal is the plane's that the file
-    tells, else the direction back along the tool.
+    tells, else the direction back along the tool. ``unknown`` is the share of what was drawn
+    whose force nobody knows, where there is any.
 
     Parameters
     ----------
     run : Record
     """
-    said = run.provenance.facts.get("contact")
+    said, force = run.provenance.facts.get("contact"), force_along_normal(run)
+    drawn = None if force is None else force[run.columns["phase"] == "stroke"]
+    known = None if drawn is None else np.isfinite(drawn)
+    missing = {}
+    if known is not None and not known.all():
+        missing["unknown"] = float(1.0 - known.mean())
     if isinstance(said, dict):
-        return dict(said)
-    force = force_along_normal(run)
-    if force is None:
+        return dict(said) | missing
+    if drawn is None or known is None or not known.any():
         return None
-    drawn = force[(run.columns["phase"] == "stroke") & np.isfinite(force)]
-    return asdict(contact(drawn, THRESHOLD)) if len(drawn) else None
+    return asdict(contact(drawn[known], THRESHOLD)) | missing
 
 
 def force_along_normal(run: Record) -> Floats | None:

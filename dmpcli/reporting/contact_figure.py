@@ -1,5 +1,6 @@
 """What a force coupling did: force, set-point, correction and state over time, and on the path."""
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -10,6 +11,7 @@ from matplotlib.patches import Patch
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.records.record import Record
 from dmpcli.reporting import contact, drawing
+from dmpcli.reporting.gaps import gaps, line, usual_step
 
 _WIDTH, _PANEL, _STRIP, _PATH = 5.9, 1.4, 0.22, 2.2
 _BAR = 0.85
@@ -56,6 +58,9 @@ def contact_figure(run: Record) -> Figure | None:
         Line2D([], [], color=_REST, lw=1.0, label="while it does not draw"),
         *(Patch(color=STATES[name], label=name) for name in present),
     ]
+    if np.isnan(normal[drawn]).any():
+        key.append(Line2D([], [], color=_REST, lw=2.4, label="path without a known force"))
+    apart = gaps(t)
     foot = _BOTTOM + drawing.ROW * -(-len(key) // 3)
     heights = (_PATH, _STRIP, _PANEL, _PANEL)
     bottoms = [foot + sum(heights[:i]) + _GAP * i for i in range(4)]
@@ -67,13 +72,13 @@ def contact_figure(run: Record) -> Figure | None:
     )
     bar = drawing.panel(figure, _LEFT + _WIDTH - _BAR + 0.15, foot, 0.13, _PATH)
     largest = max(float(np.nanmax(normal[drawn], initial=1.0)), float(meant.max()), 1.0)
-    force.plot(t, np.where(drawn, np.nan, normal), color=_REST, lw=1.0)
-    force.plot(t, np.where(drawn, normal, np.nan), color=_FORCE, lw=1.2)
-    force.plot(t, np.where(drawn, meant, np.nan), color=_MEANT, lw=1.0, ls="-.")
-    force.set_ylim(min(0.0, 1.1 * float(np.nanmin(normal))), 1.15 * largest)
+    line(force, t, np.where(drawn, np.nan, normal), apart, color=_REST, lw=1.0)
+    line(force, t, np.where(drawn, normal, np.nan), apart, color=_FORCE, lw=1.2)
+    line(force, t, np.where(drawn, meant, np.nan), apart, color=_MEANT, lw=1.0, ls="-.")
+    force.set_ylim(1.1 * float(np.nanmin(normal, initial=0.0)), 1.15 * largest)
     # On the ways e has no meaning, and the file has 0.
-    shift.plot(t, np.where(drawn | (e == 0.0), np.nan, e), color=_REST, lw=1.0)
-    shift.plot(t, np.where(drawn, e, np.nan), color=_E, lw=1.2)
+    line(shift, t, np.where(drawn | (e == 0.0), np.nan, e), apart, color=_REST, lw=1.0)
+    line(shift, t, np.where(drawn, e, np.nan), apart, color=_E, lw=1.2)
     for name in present:
         spans = _spans(t, states == name)
         strip.broken_barh(spans, (0.0, 1.0), color=STATES[name])
@@ -87,16 +92,16 @@ def contact_figure(run: Record) -> Figure | None:
         axes.set_xlim(float(t[0]), float(t[-1]))
         drawing.title(axes, title)
         drawing.labels(axes, x="t / s", y=y)
-    _on_path(path, bar, _flat(run, drawn), normal, drawn)
+    _on_path(path, bar, _flat(run, drawn), normal, drawn[1:] & drawn[:-1] & ~apart)
     figure.legend(handles=key, loc="lower center", ncols=3, handlelength=2.6, borderaxespad=0.3)
     return figure
 
 
-def _on_path(axes: Axes, bar: Axes, path: Floats, force: Floats, drawn: Booleans) -> None:
-    """Draw the path of what was drawn, coloured by the force."""
-    both = drawn[1:] & drawn[:-1]
+def _on_path(axes: Axes, bar: Axes, path: Floats, force: Floats, both: Booleans) -> None:
+    """Draw the path of what was drawn, coloured by the force, from each sample to the next."""
     pieces = np.stack([path[:-1], path[1:]], axis=1)[both]
-    lines = LineCollection(list(pieces), cmap=_MAP, linewidths=2.4)
+    colours = mpl.colormaps[_MAP].with_extremes(bad=_REST)
+    lines = LineCollection(list(pieces), cmap=colours, linewidths=2.4)
     lines.set_array(0.5 * (force[1:] + force[:-1])[both])
     axes.add_collection(lines)
     axes.set_aspect("equal", adjustable="datalim")
@@ -110,11 +115,13 @@ def _on_path(axes: Axes, bar: Axes, path: Floats, force: Floats, drawn: Booleans
 
 def _spans(t: Floats, there: Booleans) -> list[tuple[float, float]]:
     """Begin and length of each time in which something holds, s."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
-    ends = np.append(t, 2.0 * t[-1] - t[-2] if len(t) > 1 else t[-1])
+    begins = np.flatnonzero(there & ~np.append(False, there[:-1] & ~gaps(t)))
+    lasts = np.flatnonzero(there & ~np.append(there[1:] & ~gaps(t), False))
+    ends = np.append(t[1:], t[-1] + usual_step(t))
+    ends[:-1][gaps(t)] = t[:-1][gaps(t)] + usual_step(t)
     return [
         (float(t[first]), float(ends[last] - t[first]))
-        for first, last in zip(edges[::2], edges[1::2], strict=True)
+        for first, last in zip(begins, lasts, strict=True)
     ]
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -273,7 +274,9 @@ def settings(text: bool = False) -> Iterator[None]:
     text : bool
         Whether letters of an SVG stay letters, which a page can search, instead of outlines.
     """
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        # Of a file's name in letters that its font has not; a browser has them.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(RC | ({"svg.fonttype": "none"} if text else {}))
         yield

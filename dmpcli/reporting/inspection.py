@@ -31,7 +31,7 @@ from dmpcli.records import json_schema as publish
 from dmpcli.records import tables as records_tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.trajectory_reader import rows_by_id, stored
-from dmpcli.reporting import recording_summary, skill_words, tables
+from dmpcli.reporting import recording_summary, skill_words, tables, typed
 from dmpcli.reporting.stroke_measures import Row
 
 NAME, VERSION = "inspection", 1
@@ -106,7 +106,8 @@ def as_text(found: Row, width: int) -> str:
     lines: list[Table | str] = [f"{found['file']}: {found['format']}, {kind}", found["summary"]]
     if "rows" in found:
         lines.append(_extent(found))
-    lines += found.get("told", ())
+    for line in found.get("told", ()):
+        lines += typed.wrapped(line, width) if typed.is_typed(line) else [line]
     if found.get("mark"):
         lines += textwrap.wrap(tolerance_mark.text(found["file"], found["mark"]), width)
     said = {key: value for key, value in found.get("provenance", {}).items() if value}

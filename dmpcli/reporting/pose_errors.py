@@ -12,9 +12,10 @@ from rich.table import Table
 from dmpcli.arrays import Floats, Integers
 from dmpcli.metrics import pose_error
 from dmpcli.metrics.motion import path_length
-from dmpcli.metrics.pose_error import Alignment, PoseErrors
+from dmpcli.metrics.pose_error import PoseErrors, RigidAlignment
 from dmpcli.records.record import Record
 from dmpcli.reporting import drawing, tables, tracking
+from dmpcli.reporting.gaps import gaps, line
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.spatial import rotations
 from dmpcli.spatial.trajectory import Trajectory
@@ -40,7 +41,7 @@ class Compared:
         Of the whole paths, reference and estimate, mm.
     most : int
         Samples of the shorter one: as many pairs there could be.
-    alignment : Alignment or None
+    alignment : RigidAlignment or None
         What brings the estimate nearest to the reference.
     """
 
@@ -50,7 +51,7 @@ class Compared:
     estimate: Trajectory
     lengths: tuple[float, float]
     most: int
-    alignment: Alignment | None
+    alignment: RigidAlignment | None
 
     @property
     def absolute(self) -> PoseErrors:
@@ -81,6 +82,21 @@ def compared(
         (path_length(reference.position), path_length(estimate.position)),
         min(len(reference), len(estimate)),
         pose_error.alignment(there.position, here.position),
+    )
+
+
+def apart(name: str, against: str, estimate: Trajectory, reference: Trajectory) -> str:
+    """Say why two trajectories have no pair of poses."""
+    after = float(estimate.t[0] - reference.t[-1])
+    before = float(reference.t[0] - estimate.t[-1])
+    if max(after, before) > 0.0:
+        way = f"begins {after:.4g} s after {against} ends"
+        if before > 0.0:
+            way = f"ends {before:.4g} s before {against} begins"
+        return f"{name}: by its clock it {way}: there is no pose error of what is not at one time"
+    return (
+        f"{name}: fewer than two of its samples have one of {against} within "
+        f"{pose_error.MOST_APART:g} s: there is no pose error"
     )
 
 
@@ -179,17 +195,18 @@ def figure(pair: Compared) -> Figure:
         (Line2D([], [], color=_AS_IS, lw=0.8, ls=":"), "root mean square as it is"),
         (Line2D([], [], color=_ALIGNED, lw=0.8, ls=":"), "root mean square after alignment"),
     ]
-    made.legend([line for line, _ in key], [text for _, text in key], loc="lower center", ncols=2)
+    made.legend([one for one, _ in key], [text for _, text in key], loc="lower center", ncols=2)
     return made
 
 
 def _panel(axes: Axes, pair: Compared, name: str, factor: float) -> None:
     largest = 0.0
-    for errors, colour, line in ((pair.absolute, _AS_IS, "-"), (pair.aligned, _ALIGNED, "--")):
+    apart = gaps(pair.estimate.t)
+    for errors, colour, dashes in ((pair.absolute, _AS_IS, "-"), (pair.aligned, _ALIGNED, "--")):
         values = None if errors is None else getattr(errors, name)
         if values is None:
             continue
-        axes.plot(pair.estimate.t, factor * values, color=colour, lw=1.3, ls=line)
+        line(axes, pair.estimate.t, factor * values, apart, color=colour, lw=1.3, ls=dashes)
         axes.axhline(factor * pose_error.summary(values)["rmse"], color=colour, lw=0.8, ls=":")
         largest = max(largest, factor * float(values.max()))
     axes.set_ylim(0.0, 1.1 * largest or 1.0)

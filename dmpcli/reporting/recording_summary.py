@@ -3,6 +3,7 @@
 It is the very reader of `fit`, `report` and `import`, so that what stands here is what they get.
 """
 
+import shlex
 import textwrap
 from typing import Any
 
@@ -13,6 +14,7 @@ from dmpcli.errors import InputError, counted
 from dmpcli.records import plausibility, recordings, rotation_forms
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
+from dmpcli.reporting import typed
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.spatial.rotations import log
 from dmpcli.spatial.trajectory import Trajectory
@@ -45,7 +47,7 @@ def summary(source: Source, layout: Layout | None, options: str) -> Row:
     except InputError as refused:
         return {"refused": str(refused).removeprefix(f"{source.name}: ")}
     stroke = found.stroke
-    name = source.name if " " not in source.name else f"'{source.name}'"
+    name = shlex.quote(source.name)
     words = f" {options}" if options and not found.ours else ""
     return {
         "rows": len(stroke.t),
@@ -126,7 +128,7 @@ def lines(found: Row, width: int) -> list[str]:
         *(f"doubtful: {doubt}" for doubt in found["doubts"]),
     ]
     wrapped = [line for text in said for line in textwrap.wrap(text, width, subsequent_indent="  ")]
-    return [*wrapped, f"  {found['command']}"]
+    return [*wrapped, *typed.wrapped(found["command"], width)]
 
 
 def _gaps(found: Row) -> str:

@@ -8,6 +8,7 @@ from matplotlib.lines import Line2D
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.records.record import Record
 from dmpcli.reporting import contact, drawing, tracking
+from dmpcli.reporting.gaps import gaps, line
 
 _WIDTH, _PANEL = 5.9, 1.4
 _LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.62, 0.3, 0.55
@@ -45,16 +46,19 @@ def force_figure(run: Record, row: dict[str, float] | None) -> Figure | None:
     over_time = drawing.panel(figure, _LEFT, foot + _PANEL + _GAP, _WIDTH, _PANEL)
     along = drawing.panel(figure, _LEFT, foot, _WIDTH, _PANEL)
     _over_time(over_time, run.t, normal, drawing_)
-    over_time.plot(run.t, np.where(drawing_, aside, np.nan), color=_ASIDE, lw=1.0, ls="--")
+    apart = gaps(run.t)
+    shown = np.where(drawing_, aside, np.nan)
+    line(over_time, run.t, shown, apart, color=_ASIDE, lw=1.0, ls="--")
     way = _way_of_strokes(run.position(), drawing_)
-    for values, colour, line in ((normal, _FORCE, "-"), (aside, _ASIDE, "--")):
-        along.plot(way, np.where(drawing_, values, np.nan), color=colour, lw=1.2, ls=line)
-    largest = max(float(np.nanmax(np.abs(force))), meant or 0.0, _LEAST_FORCE)
+    for values, colour, dashes in ((normal, _FORCE, "-"), (aside, _ASIDE, "--")):
+        shown = np.where(drawing_, values, np.nan)
+        line(along, way, shown, apart, color=colour, lw=1.2, ls=dashes)
+    largest = max(float(np.nanmax(np.abs(force), initial=0.0)), meant or 0.0, _LEAST_FORCE)
     for axes in (over_time, along):
         axes.axhline(row["threshold"], color=_LINE, lw=0.8, ls=":")
         if meant is not None:
             axes.axhline(meant, color=_LINE, lw=1.0, ls="-.")
-        axes.set_ylim(min(0.0, 1.1 * float(np.nanmin(normal))), 1.15 * largest)
+        axes.set_ylim(1.1 * float(np.nanmin(normal, initial=0.0)), 1.15 * largest)
         drawing.labels(axes, y="force / N")
     over_time.set_xlim(float(run.t[0]), float(run.t[-1]))
     along.set_xlim(0.0, float(way[-1]) or 1.0)
@@ -86,7 +90,7 @@ def deadline_figure(run: Record) -> Figure:
         axes = drawing.panel(figure, _LEFT, bottom, _WIDTH, _PANEL)
         _over_time(axes, deadline, values, drawn)
         axes.set_xlim(float(deadline[0]), float(deadline[-1]) or 1.0)
-        axes.set_ylim(0.0, 1.15 * float(np.nanmax(values)) or 1.0)
+        axes.set_ylim(0.0, 1.15 * float(np.nanmax(values, initial=0.0)) or 1.0)
         drawing.labels(axes, y=name)
         drawing.title(axes, title)
         drawing.labels(axes, x="t / s")
@@ -95,8 +99,9 @@ def deadline_figure(run: Record) -> Figure:
 
 
 def _over_time(axes: Axes, t: Floats, values: Floats, drawn: Booleans) -> None:
-    axes.plot(t, np.where(drawn, np.nan, values), color=_REST, lw=1.0)
-    axes.plot(t, np.where(drawn, values, np.nan), color=_FORCE, lw=1.2)
+    apart = gaps(t)
+    line(axes, t, np.where(drawn, np.nan, values), apart, color=_REST, lw=1.0)
+    line(axes, t, np.where(drawn, values, np.nan), apart, color=_FORCE, lw=1.2)
 
 
 def _way_of_strokes(position: Floats, drawn: Booleans) -> Floats:
@@ -107,6 +112,6 @@ def _way_of_strokes(position: Floats, drawn: Booleans) -> Floats:
 
 def _key(figure: Figure, key: list[tuple[Line2D, str]]) -> None:
     figure.legend(
-        [line for line, _ in key], [name for _, name in key], loc="lower center", ncols=2,
+        [handle for handle, _ in key], [name for _, name in key], loc="lower center", ncols=2,
         handlelength=3.2, borderaxespad=0.3,
     )  # fmt: skip

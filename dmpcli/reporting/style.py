@@ -43,5 +43,9 @@ RC: Any = {
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "svg.hashsalt": "dmpcli",
+    "text.parse_math": False,
 }
-"""matplotlib settings of every figure; the reader's own matplotlibrc has no say."""
+"""matplotlib settings of every figure; the reader's own matplotlibrc has no say.
+
+What stands between two dollars of a file's name is no formula.
+"""

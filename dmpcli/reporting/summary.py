@@ -255,4 +255,9 @@ def _run(entry: Row) -> str:
             f"{pressed['largest']:.1f} N, and was without contact for "
             f"{100.0 * pressed['absent']:.1f} % of the time."
         )
+        if pressed.get("unknown"):
+            text += (
+                f" Of {100.0 * pressed['unknown']:.1f} % of what it drew no force is known: these "
+                "figures leave it out."
+            )
     return text

@@ -258,7 +258,7 @@ def _table(title: str, first: str, *others: str) -> Table:
 def plain(items: Sequence[Table | str], width: int) -> str:
     """Render tables and lines of text, `width` columns wide, without any terminal codes."""
     sink = io.StringIO()
-    console = Console(file=sink, width=width, color_system=None, force_terminal=False)
+    console = Console(file=sink, width=width, color_system=None, force_terminal=False, emoji=False)
     for item in items:
         if isinstance(item, Table):
             # rich would fold a title to the table's width.

@@ -15,7 +15,12 @@ Model = tuple[type[Settings], *tuple[Any, ...]]
 """A settings model and what `resolve` takes beside it."""
 
 
-def text(command: str, models: Sequence[Model], as_json: bool) -> str:
+Row = dict[str, Any]
+"""A setting: its section ("" of one that no file can say), key, value, unit, source, and what holds
+where it is not set."""
+
+
+def text(command: str, models: Sequence[Model], as_json: bool, others: Sequence[Row] = ()) -> str:
     """Return all settings as one text.
 
     Parameters
@@ -26,6 +31,8 @@ def text(command: str, models: Sequence[Model], as_json: bool) -> str:
         Its settings models, each with its layers.
     as_json : bool
         Else TOML.
+    others : sequence of dict
+        What no model holds: files, instruments, switches.
 
     Raises
     ------
@@ -33,12 +40,16 @@ def text(command: str, models: Sequence[Model], as_json: bool) -> str:
         As `resolve`.
     """
     rows = [row for kind, *layers in models for row in _rows(kind, layers)]
+    rows = sorted([*rows, *others], key=lambda row: not row["section"])
     if as_json:
         document = {"schema": "settings", "version": 1, "command": command, "settings": rows}
         return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-    lines = [f"# dmpcli {command}: every setting, and where it comes from; --config reads this."]
-    lines += ["[units]", *(f'{what} = "{unit}"' for what, unit in UNITS.items())]
-    section = ""
+    read = any(row["section"] for row in rows)
+    lines = [f"# dmpcli {command}: every setting, and where it comes from"]
+    lines[0] += "; --config reads this." if read else "."
+    if read:
+        lines += ["[units]", *(f'{what} = "{unit}"' for what, unit in UNITS.items())]
+    section = None
     for row in rows:
         if row["section"] != section:
             section = row["section"]
@@ -53,7 +64,7 @@ def text(command: str, models: Sequence[Model], as_json: bool) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rows(kind: type[Settings], layers: Sequence[Any]) -> list[dict[str, Any]]:
+def _rows(kind: type[Settings], layers: Sequence[Any]) -> list[Row]:
     values = resolve(kind, *layers).as_options()
     all_values = {one.name: getattr(resolve(kind, *layers), one.name) for one in settings_of(kind)}
     values = {name: values.get(name, all_values[name]) for name in all_values}
@@ -62,7 +73,7 @@ def _rows(kind: type[Settings], layers: Sequence[Any]) -> list[dict[str, Any]]:
         {
             "section": kind.section,
             "key": one.name if kind.section else one.flag,
-            "value": _plain(values[one.name]),
+            "value": plain(values[one.name]),
             "unit": _unit(one),
             "source": source[one.name],
             "unset": one.shown_default if values[one.name] in (None, ()) else "",
@@ -78,11 +89,12 @@ def _unit(setting: Setting) -> str:
     return "rad" if setting.option.factor != 1.0 else setting.option.unit
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return a value as JSON and TOML have it; an empty list is None."""
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, tuple | list):
-        return [_plain(one) for one in value] or None
+        return [plain(one) for one in value] or None
     return value
 
 

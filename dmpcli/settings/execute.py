@@ -181,8 +181,13 @@ class ExecuteSettings(Settings):
             )
         return wanted
 
-    def chosen_gains(self) -> "ForceGains | None":
+    def chosen_gains(self, tool: float = 0.0) -> "ForceGains | None":
         """The gains of the force coupling where a configuration states them; None is by the rule.
+
+        Parameters
+        ----------
+        tool : float
+            Mass on the sensor's tool side, N·s²/mm.
 
         Raises
         ------
@@ -201,7 +206,7 @@ class ExecuteSettings(Settings):
 
         from dmpcli.admittance import model as admittance
         from dmpcli.admittance.force_law import ForceGains
-        from dmpcli.admittance.force_stability import is_stable
+        from dmpcli.admittance.force_stability import is_safe
 
         damping = self.coupling_damping
         mass = self.period * damping if self.coupling_mass is None else self.coupling_mass
@@ -211,7 +216,7 @@ class ExecuteSettings(Settings):
         admittance.check_stable(model, ("along the normal",))
         made = ForceGains(mass, damping, self.coupling_stiffness, math.inf, self.period)
         k, late = self.stiffness, self.delay
-        if k is not None and late is not None and not is_stable(made, k, late):
+        if k is not None and late is not None and not is_safe(made, k, late, tool):
             raise InputError(
                 f"[execute] coupling_damping = {damping:g}: unstable on a contact of {k:g} N/mm "
                 f"behind {late:g} s (--stiffness, --delay); raise it, or leave it to the rule"

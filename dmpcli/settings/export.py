@@ -32,7 +32,8 @@ class ExportOptions(Settings):
         str | None, Option("What to write.", choices=WORDS, unset="by the suffix of -o")
     ] = None
     id: Annotated[
-        str | None, Option("Only this stroke, where a file holds several.", metavar="NAME")
+        str | None,
+        Option("Only this stroke, where a file holds several.", metavar="NAME", unset="all"),
     ] = None
     orientation: Annotated[
         tuple[float, float, float] | None,

@@ -10,7 +10,7 @@ the model has a TOML section); `given` holds what the command line itself says, 
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NewType, Protocol, get_args, get_origin
 
@@ -23,7 +23,9 @@ from dmpcli.settings.model import Setting, Settings, settings_of
 class Described(Protocol):
     """Says every setting of a command and where it comes from, as TOML or JSON."""
 
-    def __call__(self, name: str, said: dict[str, Any], as_json: bool) -> str:
+    def __call__(
+        self, name: str, said: dict[str, Any], as_json: bool, others: Sequence[dict[str, Any]]
+    ) -> str:
         """Return the text.
 
         Parameters
@@ -33,6 +35,8 @@ class Described(Protocol):
         said : dict
             What the command line says, by parameter.
         as_json : bool
+        others : sequence of dict
+            As `described.text` has them, of what is no setting of a model.
         """
 
 
@@ -90,11 +94,13 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
             layers[name] = (own, preset, config) if kind.section else (own,)
         return given, layers
 
-    def described(name: str, said: dict[str, Any], as_json: bool) -> str:
+    def described(
+        name: str, said: dict[str, Any], as_json: bool, others: Sequence[dict[str, Any]]
+    ) -> str:
         from dmpcli.settings.described import text
 
         _, layers = parted(said)
-        return text(name, [(models[key], *layers[key]) for key in models], as_json)
+        return text(name, [(models[key], *layers[key]) for key in models], as_json, others)
 
     def run(**said: Any) -> None:
         given, layers = parted(said)
@@ -106,7 +112,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
 
     run.__doc__, run.__module__, run.__name__ = command.__doc__, command.__module__, "command"
     run.__dict__.update(__signature__=inspect.Signature(parameters), __wrapped__=command)
-    run.__dict__["described"] = described
+    run.__dict__.update(described=described, settings=frozenset(options))
     return run
 
 

@@ -86,16 +86,16 @@ def walk_lines(
     """
     from dmpcli.surfaces.kernels import stepping
 
-    where, doubt = stepping.Nodes(*out), np.zeros(len(rows[0]), dtype=bool)
+    where, doubt = stepping.NodeArrays(*out), np.zeros(len(rows[0]), dtype=bool)
     stepping.lines(mesh.facets, _limits(), _walks(front), *rows, *nodes, where, doubt)
     return doubt
 
 
-def _limits() -> "stepping.Limits":
+def _limits() -> "stepping.WalkLimits":
     from dmpcli.surfaces.kernels import stepping
 
     g = geodesic_stepping
-    return stepping.Limits(float(g.SHARP), g.BACK, g.JUMP, g.LANDING, ON_BORDER)
+    return stepping.WalkLimits(float(g.SHARP), g.BACK, g.JUMP, g.LANDING, ON_BORDER)
 
 
 def _walks(front: Front) -> "stepping.Walks":

@@ -24,7 +24,7 @@ _MOST_BETWEEN = 32
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedLine:
     """A closed line on a mesh.
 
     Attributes
@@ -43,7 +43,7 @@ class Traced:
     crossed: Integers
 
 
-def traced(mesh: Mesh, line: Floats) -> Traced:
+def traced(mesh: Mesh, line: Floats) -> TracedLine:
     """Trace a closed line of points (M, 3) on a mesh; the last is joined to the first.
 
     Raises
@@ -76,7 +76,7 @@ def traced(mesh: Mesh, line: Floats) -> Traced:
             active, f = active[~there], f[~there]
         if len(active) == 0:
             begin, end = np.concatenate(begins), np.concatenate(ends)
-            return Traced(np.concatenate(faces), begin, end, _pairs(crossed))
+            return TracedLine(np.concatenate(faces), begin, end, _pairs(crossed))
         edge, meets = _exit(mesh, f, point[active], goal[active], side[active], entry[active])
         after = mesh.topology.neighbours[f, edge]
         lost = (after < 0) | (after == face[active])
@@ -134,7 +134,7 @@ class MeshRegion:
     ----------
     mesh : Mesh
     face, begin, end
-        Segments of the line in the order of their facets; see `Traced`.
+        Segments of the line in the order of their facets; see `TracedLine`.
     within : array of bool, shape (n,)
         Vertices inside.
     low, high : array, shape (3,)

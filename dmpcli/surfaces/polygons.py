@@ -23,7 +23,7 @@ _AT_ONCE = 500_000
 _ROUNDING = 1e-6
 
 
-class Cut(NamedTuple):
+class PolygonCut(NamedTuple):
     """Triangles of polygons.
 
     Attributes
@@ -38,7 +38,7 @@ class Cut(NamedTuple):
     crossed: Integers
 
 
-def cut(V: Floats, corners: Integers, counts: Integers) -> Cut:
+def cut(V: Floats, corners: Integers, counts: Integers) -> PolygonCut:
     """Cut polygons into triangles.
 
     Parameters
@@ -60,12 +60,12 @@ def cut(V: Floats, corners: Integers, counts: Integers) -> Cut:
         if crosses is not None:
             crossed.append(which[crosses])
     if not pieces:
-        return Cut(np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
+        return PolygonCut(np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
     F, owner = np.concatenate(pieces), np.concatenate(owners)
     F = F[np.argsort(owner, kind="stable")]
     # Ear clipping leaves straight corners out: its rows that are not needed are marked.
     F = F[F[:, 0] >= 0]
-    return Cut(F, np.sort(np.concatenate([np.empty(0, dtype=np.int64), *crossed])))
+    return PolygonCut(F, np.sort(np.concatenate([np.empty(0, dtype=np.int64), *crossed])))
 
 
 def too_large(V: Floats, corners: Integers, counts: Integers) -> int | None:

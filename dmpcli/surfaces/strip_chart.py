@@ -211,8 +211,8 @@ def _feet_compiled(
         aside,
         centre.sign,
         centre.part,
-        samples.Limits(ON_BORDER, geodesic_stepping.LANDING),
-        samples.Feet(
+        samples.SampleLimits(ON_BORDER, geodesic_stepping.LANDING),
+        samples.SampleFeet(
             foot, e_v, normal, feet.face, feet.stretch, beyond, far, back, doubt, point, slope
         ),
     )

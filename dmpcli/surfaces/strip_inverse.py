@@ -233,7 +233,7 @@ class _Strip:
     ) -> Booleans:
         """Move the coordinates of some strokes; tell which came to rest."""
         here, step = at[rows], self.step[rows]
-        spline = Spline(self.nodes.values)
+        spline = StripSpline(self.nodes.values)
         # Each stroke on its own: one that rests must not move on because others do.
         rest = np.zeros(len(rows), dtype=bool)
         for _ in range(_STEPS):
@@ -259,7 +259,7 @@ class _Strip:
         return rest
 
 
-class Spline:
+class StripSpline:
     """Bicubic pieces between the nodes of strips.
 
     Parameters

@@ -3,10 +3,9 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 from dmpcli.batch.part import Job
-from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, Shard, Summary, run
+from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, BatchSummary, Shard, run
 from dmpcli.batch.site import SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.feasibility import snapped
@@ -17,20 +16,24 @@ from dmpcli.records import file_io, pair_stream, trajectory
 from dmpcli.records.pair_stream import PairStream
 from dmpcli.records.pairs import KNOWN, PairTable
 from dmpcli.records.record import Form
+from dmpcli.records.storage import Location
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.surfaces.plane import Plane
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import SLOW, SPLIT
 
 
-def write(ready: Ready, output: Path, wanted: BatchOptions) -> None:
+def write(ready: Ready, output: Location, wanted: BatchOptions) -> None:
     """Draw the batch into a folder and say what became of it."""
     summary = draw_into(ready, output, wanted)
     _tell(ready.table.name, output, Shard(*wanted.share), summary)
 
 
 def write_pieces(
-    stream: PairStream, prepare: Callable[[PairTable], Ready], output: Path, wanted: BatchOptions
+    stream: PairStream,
+    prepare: Callable[[PairTable], Ready],
+    output: Location,
+    wanted: BatchOptions,
 ) -> None:
     """Draw a table piece by piece into a folder, and say what became of it.
 
@@ -39,7 +42,7 @@ def write_pieces(
     stream : PairStream
     prepare : callable
         Checks a piece and makes it ready.
-    output : Path
+    output : Path or ObjectPath
     wanted : BatchOptions
 
     Raises
@@ -78,7 +81,7 @@ def write_pieces(
     )
 
 
-def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
+def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> BatchSummary:
     """Draw the batch into a folder; return what was drawn.
 
     Raises
@@ -94,14 +97,14 @@ def draw_into(ready: Ready, output: Path, wanted: BatchOptions) -> Summary:
 
 
 def _drawn(
-    readies: Iterator[Ready], output: Path, wanted: BatchOptions, nested: bool, total: int
-) -> Summary:
+    readies: Iterator[Ready], output: Location, wanted: BatchOptions, nested: bool, total: int
+) -> BatchSummary:
     with _workers(wanted) as draw_with, progress("drawing", total) as advance:
         return run(_batches(readies, output, wanted, nested), draw_with, advance)
 
 
 def _batches(
-    readies: Iterator[Ready], output: Path, wanted: BatchOptions, nested: bool
+    readies: Iterator[Ready], output: Location, wanted: BatchOptions, nested: bool
 ) -> Iterator[Batch]:
     """Yield what is to be drawn; all of it is one job, that of the first piece."""
     job: Job | None = None
@@ -132,7 +135,7 @@ def _batches(
         yield batch
 
 
-def _job(ready: Ready, output: Path, wanted: BatchOptions) -> Job:
+def _job(ready: Ready, output: Location, wanted: BatchOptions) -> Job:
     task, table = ready.task, ready.table
     facts = ready.provenance.facts | {"rate": task.style.rate}
     if ready.sites is None:
@@ -203,7 +206,7 @@ def _tell_of_sites(told: SitesTold) -> None:
         tell(f"and {len(loud) - SHOWN} more remarks on surfaces")
 
 
-def _tell(name: str, output: Path, shard: Shard, summary: Summary) -> None:
+def _tell(name: str, output: Location, shard: Shard, summary: BatchSummary) -> None:
     _tell_of_sites(summary.told)
     if summary.unfolded:
         warn(

@@ -172,18 +172,19 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     batch = _found(request)
     moving = moving_goals.wanted(request.goal_from, batch, settings)
     _warn_of(batch, _name(request.trajectory))
-    coupling = execution.coupling_of(batch, settings) if request.presses else None
+    # What weighs on the sensor counts only where there is one.
+    held = _decoded(tool_file, weighed=request.sensor is not None)
+    first = batch.found[0]
+    above = first.facts.get("end_heights", (0.0, 0.0))[0]
+    scene = execution.scene(first.stroke, request.presses, above)
+    weight = (held or scene.tool).weight
+    coupling = execution.coupling_of(batch, settings, weight) if request.presses else None
     realtime = request.realtime or not repeatable
     clock = clocks.MonotonicClock() if realtime else clocks.SimulatedClock()
     keeper = None
     if not request.dry_run:
         keeper = RunOutput(request.output, realtime, repeatable or request.force)
         keeper.check()
-    first = batch.found[0]
-    above = first.facts.get("end_heights", (0.0, 0.0))[0]
-    scene = execution.scene(first.stroke, request.presses, above)
-    # What weighs on the sensor counts only where there is one.
-    held = _decoded(tool_file, weighed=request.sensor is not None)
     bench = workcell.connect(
         request.robot,
         request.sensor,
@@ -314,7 +315,7 @@ def check_output(request: ExecutionRequest, repeatable: bool) -> None:
         return
     if request.output is not None:
         suffixes.check(request.output, suffixes.PARQUET)
-        file_io.check_writable(request.output)
+        file_io.check_writable(request.output, here=True)
     why, remedy = "a run cannot be made again", "--force replaces it"
     refuse_replacing(request.output, repeatable, request.force, why, remedy)
 

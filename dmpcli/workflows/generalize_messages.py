@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from dmpcli.records.pairs import PairTable
     from dmpcli.surfaces.surface import Surface
 
+SQUARE = "the surface stands square to the one that"
+"""In what is told of a surface that the tool's side cannot be known on."""
+
 _SHOWN_OFFSET = 0.05
 _UNDECIDED = 5.0
 

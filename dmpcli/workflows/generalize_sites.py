@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.batch.site import PairSites, Prepared, Remark, Site, SiteFile
+from dmpcli.batch.site import PairSites, PreparedSite, Remark, Site, SiteFile
 from dmpcli.batch.task import Task
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.drawn_strokes import OnBorder
@@ -29,6 +29,7 @@ from dmpcli.records.pair_places import PairPlaces, Place
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import Location, beside, located
 from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.spatial.output_events import asked
 from dmpcli.spatial.pose import Pose
@@ -71,7 +72,7 @@ class Otherwise:
 
 
 def prepared_sites(
-    order: Order, folder: Path, otherwise: Otherwise, cache: Path | None = None
+    order: Order, folder: Location, otherwise: Otherwise, cache: Path | None = None
 ) -> Ready:
     """Check an order whose table names surfaces, as far as the table alone can tell.
 
@@ -79,7 +80,7 @@ def prepared_sites(
     ----------
     order : Order
         Without a surface of its own.
-    folder : Path
+    folder : Path or ObjectPath
         Of the table: its relative names start there.
     otherwise : Otherwise
     cache : Path, optional
@@ -141,14 +142,14 @@ def _said_pose(given: str) -> list[float] | str:
     return [float(word) for word in given.split()] if source is None else source.sha256
 
 
-def sites_of(table: PairTable, folder: Path, otherwise: Otherwise, offset: float) -> PairSites:
+def sites_of(table: PairTable, folder: Location, otherwise: Otherwise, offset: float) -> PairSites:
     """Make files of a table's words; what is wrong with them goes into the status of its rows.
 
     Parameters
     ----------
     table : PairTable
         With places.
-    folder : Path
+    folder : Path or ObjectPath
         That relative names start from.
     otherwise : Otherwise
     offset : float
@@ -169,11 +170,12 @@ def sites_of(table: PairTable, folder: Path, otherwise: Otherwise, offset: float
     return PairSites(sites, number[places.of])
 
 
-def _site(place: Place, folder: Path, otherwise: Otherwise, offset: float) -> Site:
+def _site(place: Place, folder: Location, otherwise: Otherwise, offset: float) -> Site:
     if place.surface:
         surface = _file(place.surface, folder)
     elif otherwise.surface is not None:
-        surface = SiteFile(str(Path(otherwise.surface).absolute()), Path(otherwise.surface).name)
+        given = located(otherwise.surface).absolute()
+        surface = SiteFile(str(given), given.name)
     else:
         raise InputError(
             "says where a surface lies, but not which: name it in column 'surface', or for all "
@@ -197,7 +199,7 @@ def _begins_with_number(words: str) -> bool:
     return True
 
 
-def _file(name: str, folder: Path) -> SiteFile:
+def _file(name: str, folder: Location) -> SiteFile:
     """Return a file that must be there.
 
     Raises
@@ -205,10 +207,10 @@ def _file(name: str, folder: Path) -> SiteFile:
     InputError
         It is not, or cannot be read.
     """
-    path = (folder / name).absolute()
+    path = beside(folder, name).absolute()
     if not path.exists():
         raise InputError(f"{name}: no such file; names are relative to the table's folder")
-    if not path.is_file() or not os.access(path, os.R_OK):
+    if not path.is_file() or (isinstance(path, Path) and not os.access(path, os.R_OK)):
         raise InputError(f"{name}: is no file that can be read")
     return SiteFile(str(path), name)
 
@@ -281,7 +283,7 @@ class SiteWork:
 
     def __call__(
         self, site: Site, ids: list[str], pairs: Pairs, duration: Floats
-    ) -> tuple[Prepared, list[Remark]]:
+    ) -> tuple[PreparedSite, list[Remark]]:
         """Read the site's surface, and hold the pairs against it.
 
         Raises
@@ -314,7 +316,7 @@ class SiteWork:
         start[good], goal[good] = ends(skill, on[good], given, style.turn)
         task = Task(skill.plain(), given, style, self.reach, asked(settings.event or ()))
         return (
-            Prepared(
+            PreparedSite(
                 task,
                 on,
                 start,

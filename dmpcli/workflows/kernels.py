@@ -10,13 +10,13 @@ import json
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from dmpcli import extras
 from dmpcli.dmp.options import Kernels, Means
 from dmpcli.errors import InputError
 from dmpcli.messages import tell
-from dmpcli.records import file_io, record
+from dmpcli.records import file_io, parquet, record
+from dmpcli.records.storage import Location
 
 MANY_ON_MESH = 1000
 """Rows from which kernels bring more than loading them costs, on meshes ..."""
@@ -31,7 +31,7 @@ OPTION = "kernels"
 """Their name in the options of a job that is drawn with them; numpy leaves no trace."""
 
 
-def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Path) -> Means:
+def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Location) -> Means:
     """Choose the means of a job.
 
     Parameters
@@ -43,7 +43,7 @@ def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Path) ->
         Whether strokes may lie on meshes.
     turning : bool
         Whether their tools turn with a surface.
-    output : Path
+    output : Path or ObjectPath
         The job's folder: what was begun there goes on as it was.
 
     Raises
@@ -73,11 +73,11 @@ def there() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-def recorded(output: Path) -> Means | None:
+def recorded(output: Location) -> Means | None:
     """Means of the parts that a folder holds; None where there are none that tell."""
     for name in sorted(file_io.parts_of(output)) if output.is_dir() else ():
         try:
-            footer = pq.read_metadata(output / name)
+            footer = parquet.footer(output / name)
             options = json.loads((footer.metadata or {})[record.KEY])["options"]
             return "compiled" if options.get(OPTION) == "compiled" else "pure"
         except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError):

@@ -19,6 +19,7 @@ from dmpcli.records import file_io, learned_skill, record, recordings, schemas
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import FARTHEST, PairTable
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import Location, located
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.settings.fit import FitSettings
 from dmpcli.settings.generalize import GeneralizeSettings
@@ -61,8 +62,8 @@ def read(path: str | Path, **said: Any) -> Any:
     InputError
         It cannot be read.
     """
-    if Path(path).is_dir():
-        return values.batch_in(Path(path))
+    if str(path) != file_io.DASH and (folder := located(path)).is_dir():
+        return values.batch_in(folder)
     source = file_io.read(path)
     if source.content.lstrip()[:1] == b"{":
         return learned_skill.read(source)
@@ -94,7 +95,7 @@ def write(value: Any, path: str | Path) -> None:
     if isinstance(value, TrajectoryBatch):
         if value.ready is None:
             raise InputError(f"{path}: this batch was read from a folder; copy that one")
-        batches.write(value.ready, Path(path), BatchOptions(on_error="skip"))
+        batches.write(value.ready, located(path), BatchOptions(on_error="skip"))
         return
     file_io.write(path, values.source_of(value, str(path)).content)
 
@@ -119,7 +120,7 @@ def read_surface(
     """
     if pose is not None and not isinstance(pose, str):
         pose = " ".join(repr(float(value)) for value in pose)
-    found = surface_input.read(Path(path), pose, unit)
+    found = surface_input.read(located(path), pose, unit)
     surface_input.remember(found)
     return found.surface
 
@@ -260,7 +261,7 @@ def _named(surface: Surface | None) -> SurfaceInput | None:
     return None if surface is None else surface_input.remembered(surface)
 
 
-def _path_of(named: SurfaceInput | None) -> Path | None:
+def _path_of(named: SurfaceInput | None) -> Location | None:
     return None if named is None else named.path
 
 

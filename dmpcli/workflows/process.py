@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dmpcli.dmp.drawn_strokes import DrawnStroke, GeneralizeOptions, OnBorder
     from dmpcli.dmp.skill import Skill
     from dmpcli.records.pairs import PairTable
+    from dmpcli.records.storage import Location
     from dmpcli.settings.generalize import GeneralizeSettings
     from dmpcli.settings.options import Given
     from dmpcli.surfaces.border_margin import BorderMargin
@@ -30,7 +31,7 @@ _OFF = 1.0
 def check(
     settings: "GeneralizeSettings",
     given: "Given",
-    surface: Path | None,
+    surface: "Location | None",
     keep_out: Path | None,
 ) -> None:
     """Refuse options that say nothing without one another, or say it twice.
@@ -40,7 +41,7 @@ def check(
     settings : GeneralizeSettings
     given : dict
         What the command line itself says of them.
-    surface, keep_out : Path or None
+    surface, keep_out : Path (of a surface ObjectPath, too) or None
 
     Raises
     ------

@@ -187,7 +187,7 @@ def check_output(output: str | None, repeatable: bool, force: bool) -> None:
     """
     if output is not None:
         suffixes.check(output, suffixes.PARQUET)
-        file_io.check_writable(output)
+        file_io.check_writable(output, here=True)
     refuse_replacing(output, repeatable, force, "a recording cannot be made again")
 
 

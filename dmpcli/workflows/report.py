@@ -4,7 +4,6 @@ import contextlib
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from dmpcli.records.atomic_text import growing
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
 from dmpcli.records.learning_record import surface_key
+from dmpcli.records.storage import Location, located
 from dmpcli.reporting import document, pose_errors, provenance
 from dmpcli.reporting.batch import STROKES, Tables, measure
 from dmpcli.reporting.batch_measures import MeasurementContext
@@ -39,7 +39,7 @@ from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.workflows import recording
-from dmpcli.workflows.report_jobs import Processes
+from dmpcli.workflows.report_jobs import ReportProcesses
 from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
 
@@ -83,7 +83,7 @@ class StrokeReport:
         return [row for entry in self.document["files"] for row in entry["strokes"]]
 
 
-def check_output(output: Path | None) -> None:
+def check_output(output: Location | None) -> None:
     """Refuse the name of a folder that is a file's.
 
     Raises
@@ -99,7 +99,7 @@ def report(
     names: Sequence[str] | None,
     layout: Layout | None,
     read: SurfaceInput | None,
-    output: Path | None,
+    output: Location | None,
     grounds: SiteGrounds | None = None,
     paper: bool = False,
     view: bool = False,
@@ -119,7 +119,7 @@ def report(
         How recordings of other programs are read.
     read : SurfaceInput, optional
         What the strokes lie on.
-    output : Path, optional
+    output : Path or ObjectPath, optional
         Folder of the page, JSON, CSV and figures.
     grounds : SiteGrounds, optional
         What the strokes of batches lie on, each on its own.
@@ -177,8 +177,8 @@ def _part(
     grounds: SiteGrounds | None,
 ) -> DocumentPart:
     """Read one input, whatever it is; how recordings are seen, all of them together tell."""
-    if isinstance(given, str) and given != file_io.DASH and Path(given).is_dir():
-        return _batch(Path(given), label, normal, grounds)
+    if isinstance(given, str) and given != file_io.DASH and (folder := located(given)).is_dir():
+        return _batch(folder, label, normal, grounds)
     source = given if isinstance(given, Source) else file_io.read(given)
     if source.content.lstrip()[:1] == b"{":
         learned, file = skills.decode(source)
@@ -211,7 +211,7 @@ def _part(
 
 
 def _batch(
-    folder: Path, label: str, normal: Floats | None, grounds: SiteGrounds | None
+    folder: Location, label: str, normal: Floats | None, grounds: SiteGrounds | None
 ) -> DocumentPart:
     """Read a batch: all strokes of a small one; of a large one what its parts say of themselves."""
     batch, odd = dataset.read(folder)
@@ -325,7 +325,7 @@ def _warn_of_ends(parts: list[DocumentPart], read: SurfaceInput) -> None:
 
 
 @contextlib.contextmanager
-def _tables(output: Path | None, batches: bool) -> Iterator[Tables | None]:
+def _tables(output: Location | None, batches: bool) -> Iterator[Tables | None]:
     """Open the tables that grow with the strokes; without a folder there are none."""
     if output is None:
         yield None
@@ -341,7 +341,7 @@ def _measured(
     parts: list[DocumentPart], sight: MeasurementContext, tables: Tables | None, jobs: int
 ) -> list[DocumentPart]:
     """Measure large batches, and write down the wave heights of all strokes."""
-    elsewhere = Processes(jobs) if jobs > 1 else None
+    elsewhere = ReportProcesses(jobs) if jobs > 1 else None
     done = []
     total = sum(len(part.batch) for part in parts if part.batch)
     with progress("measuring", total) as advance:
@@ -370,9 +370,10 @@ def _compared(parts: list[DocumentPart]) -> list[DocumentPart]:
         if part.run is not None:
             found = pose_errors.followed(part.run, part.name)
         elif part.recorded and part is not recorded[0]:
-            found = pose_errors.compared(
-                part.name, recorded[0].name, *_by_one_clock(part.recorded, recorded[0])
-            )
+            here, there = _by_one_clock(part.recorded, recorded[0])
+            found = pose_errors.compared(part.name, recorded[0].name, here, there)
+            if found is None:
+                tell(pose_errors.apart(part.name, recorded[0].name, here, there))
         elif len(part.strokes) == 1 and not recorded and part is not planned[0]:
             first = planned[0]
             if len(first.strokes) == 1:
@@ -393,7 +394,7 @@ def _by_one_clock(one: Recorded, first: DocumentPart) -> tuple[Trajectory, Traje
 
 
 def _write(
-    output: Path,
+    output: Location,
     report: Row,
     parts: list[DocumentPart],
     ground: ReportSurface | None,
@@ -423,7 +424,9 @@ def _write(
         files["view.html"] = turnable.page(strokes, ground, [p.run for p in parts if p.run])
     # What an earlier report wrote and this one does not would be taken for its own.
     ours = ("fig[0-9]_*", "batch_*", *(f"{name}*" for name in figures.NAMES))
-    old = [path for name in ours for path in output.glob(name) if path.suffix in (".svg", ".png")]
+    old: list[Location] = [
+        path for name in ours for path in output.glob(name) if path.suffix in (".svg", ".png")
+    ]
     old += [output / name for name in ("report.html", "view.html")]
     for path in old:
         if path.name not in files:

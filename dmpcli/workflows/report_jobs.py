@@ -18,7 +18,7 @@ _AHEAD = 2
 _how: Measurement | None = None
 
 
-class Processes:
+class ReportProcesses:
     """Measures parts in so many processes; what they find comes in the order of the parts.
 
     Parameters

@@ -13,6 +13,7 @@ from dmpcli.errors import InputError
 from dmpcli.messages import heard
 from dmpcli.records import dataset, file_io, pairs
 from dmpcli.records.learning_record import surface_key
+from dmpcli.records.storage import Location
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.surfaces.mesh import Mesh
@@ -25,7 +26,7 @@ class SiteGrounds:
 
     Parameters
     ----------
-    path : Path
+    path : Path or ObjectPath
         Of the table that a batch was drawn from.
     otherwise : Otherwise
         What the command line says where the table says nothing.
@@ -38,7 +39,7 @@ class SiteGrounds:
         The table cannot be read, or names no surfaces.
     """
 
-    def __init__(self, path: Path, otherwise: Otherwise, cache: Path | None = None) -> None:
+    def __init__(self, path: Location, otherwise: Otherwise, cache: Path | None = None) -> None:
         source = file_io.read(path)
         table = pairs.read(source)
         if table.places is None:

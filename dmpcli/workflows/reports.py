@@ -8,6 +8,7 @@ from typing import Any
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.records.file_io import Source
+from dmpcli.records.storage import located
 from dmpcli.reporting import inspection
 from dmpcli.reporting.strokes import labels_of
 from dmpcli.settings.layers import resolve
@@ -62,7 +63,7 @@ def report(
         raise InputError("there is no stroke to report; give at least one")
     if names is not None and len(set(names)) != len(strokes):
         raise InputError(f"names: {len(strokes)} strokes need as many different names")
-    folder = None if output is None else Path(output)
+    folder = None if output is None else located(output)
     reporting.check_output(folder)
     layout = resolve(RecordingOptions, said).as_layout()
     on = None if surface is None else surface_input.remembered(surface)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dmpcli.records.file_io import Source
     from dmpcli.records.mesh_store import MeshStore
     from dmpcli.records.pose import PoseFile
+    from dmpcli.records.storage import Location
     from dmpcli.spatial.pose import Pose
     from dmpcli.surfaces.surface import Surface
 
@@ -25,7 +26,7 @@ class SurfaceInput:
 
     Attributes
     ----------
-    path : Path
+    path : Path or ObjectPath
     surface : Surface
         In the base frame, mm.
     kind : {'plane', 'cylinder', 'sphere', 'mesh'}
@@ -43,7 +44,7 @@ class SurfaceInput:
         X Y Z RX RY RZ as given or as in the pose file, not yet brought to one turn; or empty.
     """
 
-    path: Path
+    path: "Location"
     surface: "Surface"
     kind: str
     sha256: str
@@ -72,7 +73,7 @@ class SurfaceInput:
         return {"file": self.path.name, "sha256": self.sha256, "unit": self.unit, "pose": pose}
 
 
-def check_options(surface: Path | None, pose: str | None, unit: str | None) -> None:
+def check_options(surface: "Location | None", pose: str | None, unit: str | None) -> None:
     """Refuse a pose or a unit of no surface.
 
     Raises
@@ -85,7 +86,7 @@ def check_options(surface: Path | None, pose: str | None, unit: str | None) -> N
 
 
 def read(
-    path: Path,
+    path: "Location",
     pose: str | None,
     unit: str | None,
     summary: bool = False,
@@ -95,7 +96,7 @@ def read(
 
     Parameters
     ----------
-    path : Path
+    path : Path or ObjectPath
         A plane, cylinder or sphere file, or a mesh.
     pose : str, optional
         ``X Y Z RX RY RZ`` in mm and rad, or a pose file.
@@ -168,6 +169,7 @@ def placed_input(
     from dmpcli.records import pose as pose_file
     from dmpcli.records import surface as surface_file
     from dmpcli.records.mesh_store import MeshStore
+    from dmpcli.records.storage import located
     from dmpcli.workflows.pose_hints import warn_of_angles
 
     inputs = [{"role": "surface", "sha256": source.sha256}]
@@ -196,7 +198,7 @@ def placed_input(
     else:
         kind, shape = surface_file.kind(found), found
     return SurfaceInput(
-        Path(source.name),
+        located(source.name),
         shape,
         kind,
         inputs[0]["sha256"],

@@ -21,6 +21,7 @@ from dmpcli.records.layouts import Layout
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import OK
+from dmpcli.records.storage import Location
 from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke
@@ -98,7 +99,7 @@ class TrajectoryBatch(Trajectory):
     ids : list of str, length B
     ready : Ready, optional
         What it was drawn from.
-    folder : Path, optional
+    folder : Path or ObjectPath, optional
         That it was read from.
     """
 
@@ -106,7 +107,7 @@ class TrajectoryBatch(Trajectory):
     length: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ids: list[str] = field(default_factory=list)
     ready: Ready | None = field(default=None, repr=False, compare=False)
-    folder: Path | None = field(default=None, repr=False, compare=False)
+    folder: Location | None = field(default=None, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -158,7 +159,7 @@ def of_run(found: Record, source: Source | None = None) -> Run:
     )
 
 
-def batch_in(folder: Path) -> TrajectoryBatch:
+def batch_in(folder: Location) -> TrajectoryBatch:
     """Read the folder of a batch whole."""
     pairs = record.decode(file_io.read_table(folder), schemas.PAIRS)
     known: dict[str, Trajectory] = {}
@@ -294,7 +295,7 @@ def source_of(value: Any, path: str = "") -> Source:
 
 
 @contextlib.contextmanager
-def folder_of(batch: TrajectoryBatch) -> Iterator[Path]:
+def folder_of(batch: TrajectoryBatch) -> Iterator[Location]:
     """Lend the folder of a batch: the one that it was read from, else one that is removed again."""
     if batch.folder is not None:
         yield batch.folder

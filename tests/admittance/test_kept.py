@@ -68,8 +68,11 @@ def forces_under_control():
             force_stability.is_stable(gains, s, delay) for s in (0.5 * stiffness, 9.0 * stiffness)
         ]
         found += [
-            force_stability.largest_stiffness(gains, delay),
-            force_stability.loop_matrix(gains, stiffness, delay),
+            force_stability.is_safe(gains, s, delay, 0.6e-3) for s in (stiffness, 9.0 * stiffness)
+        ]
+        found += [
+            force_stability.loop_matrix(gains, stiffness, delay, 0.6e-3),
+            force_stability.steadied(gains.softened(0.3), stiffness, delay, 0.6e-3),
         ]
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02))
         found.append(force_stability.smallest_damping(stiffness, delay, 0.02, 4.0))
@@ -172,7 +175,7 @@ def loops_of_any_delay():
         ):
             found += [gains, force_stability.loop_matrix(gains, 3.0, delay)]
             found += [force_stability.growth(gains, 3.0, delay)]
-            found += [force_stability.largest_stiffness(gains, delay)]
+            found += [force_stability.steadied(gains, 30.0, delay, 2e-4)]
         found.append(force_stability.smallest_damping(3.0, delay, 0.02, 0.4))
     state, gains = force_law.LawState(0.1, 2.0, 0.05), force_law.by_rule(2.0, 0.06, 0.02)
     for error, fastest in ((9.0, 1.0), (-9.0, 1.0), (0.3, 50.0), (2.0, 0.5)):

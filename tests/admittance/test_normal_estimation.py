@@ -13,7 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def angle(a, b):
-    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b)))
 
 
 def slid(normal, mu, path, seed=0, noise=0.05, push=5.0, knocks=0):
@@ -97,7 +97,7 @@ def test_a_lean_is_carried_with_the_planned_normal_round_a_cylinder():
         return np.array([np.sin(phi), 0.0, np.cos(phi)])
 
     for axis in (np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
-        made = exp(lean * axis) @ UP
+        made = tuple(exp(lean * axis) @ UP)
         for before, now in pairwise(way):
             made = carried(made, round_(before), round_(now))
         assert np.linalg.norm(made) == pytest.approx(1.0)

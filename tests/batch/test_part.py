@@ -55,7 +55,7 @@ def write(folder, skill, mesh, table, on_border, stop=True):
     lasting = np.full(len(table), skill.duration)
     done = []
     Batch(job, table, table.pairs, lasting, 2000).run(
-        workers.here, lambda pairs, _: done.append(pairs)
+        workers.here, lambda pairs, *_, **__: done.append(pairs)
     )
     return done
 

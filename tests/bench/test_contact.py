@@ -126,6 +126,14 @@ def test_noise_bias_and_zero_are_as_asked_for():
     assert (np.abs(np.mean(white[1:] * white[:-1], axis=0)) < 0.1 * noise**2).all()
 
 
+def test_a_zero_drifts_evenly():
+    drift = np.array([0.0, 0.1, -0.3, 0.0, 0.0, 0.0])
+    bench = world(Nothing(), sensor=WristSensor(noise=np.zeros(6), drift=drift))
+    before = bench.sensed() - bench.felt()
+    bench.advance(2.0)
+    np.testing.assert_allclose(bench.sensed() - bench.felt() - before, 2.0 * drift, atol=1e-9)
+
+
 def test_the_same_seed_reads_the_same_and_another_one_does_not():
     one, same, other = (world(sensor=WristSensor(), seed=seed).sensed() for seed in (3, 3, 4))
     np.testing.assert_array_equal(one, same)

@@ -11,7 +11,7 @@ from dmpcli.extras import BENCH
 from dmpcli.kinematics.models import model
 from dmpcli.simulation.elite_server.joint_arm import JointArm
 from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab, parked
-from dmpcli.simulation.elite_server.workpiece import Workpiece, facing
+from dmpcli.simulation.elite_server.workpiece import SpringWorkpiece, facing
 from dmpcli.simulation.mock import PEN, PEN_DOWN
 from dmpcli.simulation.mock.parameters import Plate, SensorParameters
 from dmpcli.spatial import wrench
@@ -84,6 +84,6 @@ def test_a_stop_holds_the_joints():
 
 
 def test_a_part_that_is_touched_from_inside_is_refused_unless_it_can_be_turned():
-    inside = Workpiece(Sphere(TIP + 50.0 * UP, 50.0), sign=-1.0)
+    inside = SpringWorkpiece(Sphere(TIP + 50.0 * UP, 50.0), sign=-1.0)
     with pytest.raises(InputError, match="from inside"):
         BenchArm(replace(setting(), ground=inside), joints_at())

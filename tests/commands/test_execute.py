@@ -247,6 +247,24 @@ def test_gains_that_the_named_contact_makes_swing_are_refused_before_anything_mo
     assert "unstable on a contact of 5 N/mm behind 0.1 s" in said
 
 
+@pytest.mark.parametrize("weight", [6.0, 30.0])
+def test_a_heavy_tool_makes_gains_swing_that_a_light_one_does_not(traj, tmp_path, weight):
+    """The sensor feels its inertia, which on a soft contact is most of what it feels."""
+    with open("sample_runs/bench_pen.json") as file:
+        heavy = json.load(file)
+    heavy["payload"]["weight"] = weight
+    (tmp_path / "tool.json").write_text(json.dumps(heavy))
+    config = tmp_path / "c.toml"
+    config.write_text("[execute]\ncoupling_damping = 0.06\n")
+    options = ("--coupling", "force", "--config", config, "--stiffness", 0.5, "--delay", 0.06)
+    options += ("--tool", tmp_path / "tool.json", "--dry-run")
+    if weight < 20.0:
+        execute(traj, *options)
+    else:
+        said = refused(traj, *options, code=2)
+        assert "unstable on a contact of 0.5 N/mm behind 0.06 s" in said
+
+
 @pytest.mark.parametrize("force", [[-1.0], [np.nan], [2e4]])
 def test_a_force_that_is_none_is_named_by_row(tmp_path, force):
     cols = columns()

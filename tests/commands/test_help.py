@@ -15,6 +15,29 @@ from tests.settings.test_options import OPTIONS
 
 GROUP = typer.main.get_command(cli.app)
 
+UNITLESS = {
+    ("record", "--periods"): "a count, in parts",
+    ("simulate", "--periods"): "a count, in parts",
+    ("fit", "--basis"): "a count",
+    ("fit", "--damping"): "of eq. (1), without a unit by its phase",
+    ("fit", "--tau"): "a share of the duration",
+    ("fit", "--alpha-1"): "of eq. (2), without a unit by its phase",
+    ("generalize", "--scale"): "a ratio",
+    ("execute", "--speed"): "a ratio",
+    ("calibrate", "--condition"): "a ratio",
+}
+"""Numbers that have no unit, and why. INTEGER is a count, a port or a seed."""
+
+NOTHING = {
+    "--body", "--border-margin", "--columns", "--config", "--coupling", "--drawn", "--episode",
+    "--event", "--for", "--force-setpoint", "--from", "--goal", "--goal-from",
+    "--goal-orientation", "--keep-out", "--log", "--map", "--orientation", "--output", "--pairs",
+    "--part", "--preset", "--robot-model", "--save", "--schema", "--start",
+    "--start-orientation", "--surface", "--surface-cache", "--surface-pose", "--tool",
+    "--workspace",
+}  # fmt: skip
+"""Options without which nothing is: no such file is read or written, no such check is made."""
+
 
 def options_of(name):
     context = GROUP.commands[name].make_context(name, [], resilient_parsing=True)
@@ -36,6 +59,22 @@ def test_no_option_lacks_its_default():
     assert missing == []
 
 
+def test_none_is_the_default_of_what_does_nothing_unless_it_is_given_alone():
+    """What holds without an option stands in its help; that it is nothing, of these alone."""
+    found, declared = set(), {(name, one.flag): one.default for name, one in OPTIONS}
+    for name in cli.COMMANDS:
+        context, options = options_of(name)
+        for option in options:
+            if option.get_help_record(context)[1].endswith("[default: none]"):
+                assert option.default is None, (name, option.opts)
+                found.add(max(option.opts, key=len))
+            elif "[default: off]" in option.get_help_record(context)[1]:
+                assert option.is_flag, (name, option.opts)
+                off = declared.get((name, max(option.opts, key=len)), option.default)
+                assert off is False, (name, option.opts)
+    assert found == NOTHING
+
+
 def test_no_number_lacks_its_unit():
     """Its form is its unit; a point's stands in its words; a count or ratio says that it is one."""
     missing, seen = [], 0
@@ -45,9 +84,11 @@ def test_no_number_lacks_its_unit():
             continue
         seen += 1
         form = one.metavar.split("|")[-1]
-        if form not in ("NUMBER", "INTEGER") and not re.fullmatch(r"[A-Z]+[A-Z/*^0-9]*", form):
+        bare = (command, one.flag) in UNITLESS
+        if bare != (not one.option.unit) and form != "INTEGER":
             missing.append((command, one.flag, form))
-        if form == "NUMBER" and one.option.unit:
+        units = r"(MM|RAD|DEG|S|HZ|N|N\*M|KG|PERCENT)(/(MM|S|RAD|N|M)(\^\d)?)?"
+        if one.option.unit and not re.fullmatch(units, form):
             missing.append((command, one.flag, form))
     for name in cli.COMMANDS:
         context, options = options_of(name)

@@ -1,6 +1,7 @@
 """``report`` of two TUM files: evo's APE, RPE, alignment and path length, from the same files."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,9 @@ from tests.commands.running import invoke
 from tests.outside_judge import judge
 
 HEAD = "# timestamp tx ty tz qx qy qz qw\n"
+
+EVO = Path(__file__).parent / "evo.json"
+"""What evo 1.38.1 said of the two files, so that `make test` need not install it."""
 
 
 def tum(path, began, dt, n, noise, seed):
@@ -54,6 +58,10 @@ def test_two_recordings_are_compared_by_the_clock_that_both_have(two):
 def test_two_clocks_that_never_meet_give_no_pose_error(tmp_path, two):
     other = tum(tmp_path / "later.tum", 1700009999.0, 0.02, 400, 0.0, 1)
     assert measured(two[0], other) is None
+    done = invoke("report", two[0], other, "--layout", "tum")
+    assert "later: by its clock it begins 9991 s after truth ends" in done.stderr
+    done = invoke("report", other, two[0], "--layout", "tum")
+    assert "truth: by its clock it ends 9991 s before later begins" in done.stderr
 
 
 def test_few_pairs_are_told(tmp_path, two):
@@ -64,32 +72,63 @@ def test_few_pairs_are_told(tmp_path, two):
     assert "Pose error" in done.stdout
 
 
-@judge("evo", "evo")
-def test_evo_says_the_same_of_the_same_files(two):
+def evos(files):
+    """What evo says of two TUM files, in the units of `report`: mm and degrees."""
     from evo.core import metrics, sync
     from evo.tools import file_interface
 
-    row = measured(*two)
-    reference, estimate = (file_interface.read_tum_trajectory_file(str(path)) for path in two)
-    assert row["reference_length"] / 1000.0 == pytest.approx(reference.path_length, abs=1e-6)
-    assert row["length"] / 1000.0 == pytest.approx(estimate.path_length, abs=1e-6)
+    reference, estimate = (file_interface.read_tum_trajectory_file(str(path)) for path in files)
+    lengths = [1000.0 * one.path_length for one in (reference, estimate)]
     reference, estimate = sync.associate_trajectories(reference, estimate)
-    assert row["pairs"] == reference.num_poses
-
-    def same(ours, metric, relation, factor):
-        judged = metric(relation)
-        judged.process_data((reference, estimate))
-        for name, value in judged.get_all_statistics().items():
-            scale = factor**2 if name == "sse" else factor
-            assert ours[name] == pytest.approx(scale * value, abs=1e-6 * scale, rel=1e-6), name
-
     relations = metrics.PoseRelation
-    for key, metric in (("ape", metrics.APE), ("rpe", metrics.RPE)):
-        same(row[key]["position"], metric, relations.translation_part, 1000.0)
-        same(row[key]["rotation"], metric, relations.rotation_angle_deg, 1.0)
+
+    def judged(metric, one):
+        found = {}
+        for key, relation, factor in (
+            ("position", relations.translation_part, 1000.0),
+            ("rotation", relations.rotation_angle_deg, 1.0),
+        ):
+            measured_by = metric(relation)
+            measured_by.process_data((reference, one))
+            said = measured_by.get_all_statistics()
+            found[key] = {
+                name: (factor**2 if name == "sse" else factor) * float(value)
+                for name, value in said.items()
+            }
+        return found
+
+    found = {"pairs": reference.num_poses, "reference_length": lengths[0], "length": lengths[1]}
+    found |= {"ape": judged(metrics.APE, estimate), "rpe": judged(metrics.RPE, estimate)}
     turned, moved, _ = estimate.align(reference)
-    same(row["aligned"]["ape"]["position"], metrics.APE, relations.translation_part, 1000.0)
-    same(row["aligned"]["ape"]["rotation"], metrics.APE, relations.rotation_angle_deg, 1.0)
-    found = rotations.from_quaternion(np.array([row["aligned"]["rotation"]]))[0]
-    assert found == pytest.approx(turned, abs=1e-6)
-    assert np.array(row["aligned"]["position"]) / 1000.0 == pytest.approx(moved, abs=1e-6)
+    found["aligned"] = {"ape": judged(metrics.APE, estimate), "turned": turned.tolist()}
+    found["aligned"]["moved"] = (1000.0 * moved).tolist()
+    return found
+
+
+def same(ours, theirs, rel=1e-6):
+    """Hold a row of the report against what evo says."""
+    for key in ("pairs", "reference_length", "length"):
+        assert ours[key] == pytest.approx(theirs[key], rel=1e-9), key
+    aligned = (ours["aligned"]["ape"], theirs["aligned"]["ape"])
+    for mine, its in ((ours["ape"], theirs["ape"]), (ours["rpe"], theirs["rpe"]), aligned):
+        for part in ("position", "rotation"):
+            assert mine[part].keys() == its[part].keys()
+            for name, value in its[part].items():
+                assert mine[part][name] == pytest.approx(value, abs=1e-6, rel=rel), (part, name)
+    found = rotations.from_quaternion(np.array([ours["aligned"]["rotation"]]))[0]
+    assert found == pytest.approx(np.array(theirs["aligned"]["turned"]), abs=1e-6)
+    assert ours["aligned"]["position"] == pytest.approx(theirs["aligned"]["moved"], abs=1e-6)
+
+
+def test_report_says_what_evo_said_of_the_same_files(two):
+    same(measured(*two), json.loads(EVO.read_text()))
+
+
+@judge("evo", "evo")
+def test_evo_says_the_same_of_the_same_files(two):
+    theirs = evos(two)
+    same(measured(*two), theirs)
+    kept = json.loads(EVO.read_text())
+    for part in ("ape", "rpe"):
+        for key in ("position", "rotation"):
+            assert theirs[part][key] == pytest.approx(kept[part][key], rel=1e-9)

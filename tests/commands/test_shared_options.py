@@ -123,6 +123,8 @@ def test_print_config_names_the_source_of_every_setting(folder):
         "preset paper",
         "run.toml",
         "option --damping",
+        "option --preset",
+        "option --config",
         "default",
     }
 

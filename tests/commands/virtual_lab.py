@@ -43,7 +43,7 @@ class Lab:
         assert self._process.stdout is not None
         self.line = self._process.stdout.readline()
         watchdog.cancel()
-        words = dict(word.split("=", 1) for word in self.line.split()[1:])
+        words = dict(word.split("=", 1) for word in self.line.split()[1:] if "=" in word)
         self.sensor, self.robot = words.get("sensor", ""), words.get("robot", "")
         self.code, self.told, self.rest = -1, "", ""
 

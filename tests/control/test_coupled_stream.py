@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dmpcli.admittance.force_coupling import fast_filter
 from dmpcli.admittance.force_law import by_rule
-from dmpcli.admittance.force_stability import is_stable
+from dmpcli.admittance.force_stability import is_safe
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.cycle import ReadyArm, StopLimits
@@ -82,7 +82,7 @@ def test_where_e_is_0_the_coupled_stream_is_the_plain_one(k, delay, duration):
 @given(st.floats(1.2, 10.0), st.floats(0.05, 0.15), st.floats(-4.0, 4.0))
 def test_after_contact_has_ended_the_offset_decays_and_the_goal_is_reached(k, delay, over):
     """Over random gains that are stable on the plate, which lies up to 4 mm off the plan."""
-    assume(is_stable(by_rule(k, delay + PERIOD / 2.0, PERIOD), PLATE, 0.06))
+    assume(is_safe(by_rule(k, delay + PERIOD / 2.0, PERIOD), PLATE, 0.06))
     force = np.full(151, 5.0)
     made, loop, sent = drawn(force, over, stiffness=k, whole_delay=delay)
     columns = loop.log.columns()

@@ -10,7 +10,7 @@ import pytest
 from dmpcli.admittance.force_coupling import fast_filter
 from dmpcli.admittance.force_law import ForceGains
 from dmpcli.control import execution
-from dmpcli.control.contact_policy import ContactPolicy
+from dmpcli.control.contact_policy import ContactEvent, ContactPolicy
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.normal_sensing import NormalPolicy
 from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
@@ -141,11 +141,11 @@ def test_the_filter_is_that_of_the_strokes_tau_at_the_speed_and_period_of_the_ru
         np.testing.assert_allclose(found.transition, own.transition)
     # Of several strokes it is the first one's; each of them is asked.
     batch = selection(pressed, dataclasses.replace(pressed, t=2.0 * pressed.t), facts={"k": 1.0})
-    assert execution.coupling_of(batch, settings).tau == pytest.approx(10.0 / speed)
+    assert execution.coupling_of(batch, settings, 5.0).tau == pytest.approx(10.0 / speed)
     late = dataclasses.replace(pressed, t=pressed.t + 100.0)
     assert execution.coupling_filter(late, {}, settings).tau == pytest.approx(10.0 / speed)
     with pytest.raises(InputError, match="no surface normal"):
-        execution.coupling_of(selection(pressed, stroke()), settings)
+        execution.coupling_of(selection(pressed, stroke()), settings, 5.0)
 
 
 def test_a_set_point_or_gains_that_must_not_be_are_refused_before_anything_moves():
@@ -154,7 +154,7 @@ def test_a_set_point_or_gains_that_must_not_be_are_refused_before_anything_moves
         execution.coupling_filter(hard, {}, ExecuteSettings())
     execution.coupling_filter(hard, {}, ExecuteSettings(max_force=50.1))
     with pytest.raises(InputError, match="coupling_mass"):
-        execution.coupling_filter(stroke(normal=UP), {}, ExecuteSettings(coupling_mass=1.0))
+        execution.coupling_of(selection(stroke(normal=UP)), ExecuteSettings(coupling_mass=1.0), 5.0)
 
 
 class Playing(FakeServo):
@@ -343,27 +343,29 @@ def pressed_like(**found):
         "share": 0.75,
         "saturated": 0.0,
     } | found
-    supervisor = SimpleNamespace(wall=None, events=[])
-    return SimpleNamespace(facts=lambda: {"contact": whole}, supervisor=supervisor)
+    supervisor = SimpleNamespace(events=[])
+    facts = {"contact": whole}
+    return SimpleNamespace(facts=lambda: facts, supervisor=supervisor, wall=None)
 
 
 def test_how_hard_it_pressed_is_said_in_one_line():
     assert execution.pressed(SimpleNamespace(facts=dict)) == "no stroke was drawn under force"
     assert execution.pressed(pressed_like()) == (
         "force along the normal 4.00 N in the mean, 1.00 to 6.00 N, RMS error 0.50 N; no contact "
-        "on 25 % of the stroke"
+        "on 25 % of the stroke; contact: "
     )
     more = pressed_like(landing_peak=5.5, stiffness=2.0, delay=0.06, saturated=0.125)
-    more.supervisor.wall = "9 N"
+    more.wall = "9 N"
     more.supervisor.events = [
-        SimpleNamespace(state="drawing"),
-        SimpleNamespace(state="oscillating"),
+        ContactEvent(0.5, "drawing"),
+        ContactEvent(1.25, "oscillating"),
     ]
     assert execution.pressed(more).split("; ")[2:] == [
         "landed with 5.50 N at the most, on 2 N/mm behind 0.06 s",
         "ended by a wall: 9 N",
         "at its limits on 12 % of the stroke",
         "the force swung, and the gains were softened",
+        "contact: drawing at 0.50 s, oscillating at 1.25 s",
     ]
     leans = pressed_like(
         normal_angle={"mean": np.radians(2.0), "p95": np.radians(3.5)}, friction=0.3

@@ -211,3 +211,15 @@ def test_how_long_is_waited_for_a_zero_a_check_and_a_sign_of_life():
         assert felt._clock.now() == pytest.approx(waited)
     # Without a tolerance the tool may be another sensor's.
     assert sensing([sample(0.1)]).zeroed(replace(PEN, sensor="other"), LEVEL, 0.5)
+
+
+def test_looking_back_takes_what_is_whole_and_fails_for_nothing():
+    good = sample(0.0, 1.0)
+    bad = [sample(0.01, healthy=False), sample(0.02, np.nan)]
+    assert sensing([good, *bad]).rest() == [good]
+
+    class Broken:
+        def poll(self):
+            raise InstrumentError("the cable is out")
+
+    assert Sensing(Broken(), INFO, 100.0, 0.02, SimulatedClock()).rest() == []

@@ -17,7 +17,7 @@ from dmpcli.control.stopping import StopOutcome
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.spatial.rotations import exp
-from tests.control.fake_sensors import PolledSensor
+from tests.control.fake_sensors import PolledSensor, StreamingSensor
 from tests.control.streaming_fakes import (
     PEN_DOWN,
     START,
@@ -429,6 +429,51 @@ def test_where_contact_is_lost_for_good_it_comes_to_rest_and_says_so():
     assert "not found again within 6 mm" in outcome.reason
     assert bench.rows[-1].phase == "stop"
     assert bench.loop.stop_outcome.confirmed
+
+
+def test_a_wall_is_told_by_what_is_felt_until_the_arm_stands():
+    """800 N/s for 60 ms, from 5 ms before a reading on: the cycle that ends it feels a part."""
+    met = []
+
+    def feel(t):
+        height = bench.servo.position[2]
+        side = 800.0 * min(max(t - met[0], 0.0), 0.06) if met else 0.0
+        return np.array([side, 0.0, 2.0 * max(START[2] - height, 0.0), 0.0, 0.0, 0.0])
+
+    at = drawing()
+    bench = pressing(at={at: lambda servo: met.append(bench.clock.now() + 0.005)})
+    streaming = StreamingSensor(bench.clock, feel)
+    streaming.start(100.0)
+    bench.sensor.poll = streaming.poll
+    outcome = bench.run()
+    assert isinstance(outcome.failure, RefusedError)
+    wall = bench.loop.pressing.facts()["contact"]["wall"]
+    assert wall["largest"] == pytest.approx(48.0, abs=0.1)
+    assert wall["across"] < 16.0
+    # The sensor's interval, the delay and a period.
+    reaction = bench.loop.pressing.supervisor.delay + PERIOD + 0.01
+    assert wall["unavoidable"] == pytest.approx(800.0 * reaction, rel=0.01)
+    x = bench.plan.position[:, 0]
+    speed = np.abs(np.diff(x)).max() / PERIOD
+    assert 0.3 * speed < wall["speed"] <= speed
+    assert wall["stiffness"] == pytest.approx(800.0 / wall["speed"], rel=0.01)
+    assert f"{wall['unavoidable']:.1f} N are unavoidable" in outcome.reason
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.03])
+def test_how_far_the_zero_has_moved_is_seen_where_the_tool_is_clear_at_last(drift):
+    def feel(t):
+        push = 2.0 * max(START[2] - bench.servo.position[2], 0.0)
+        return np.array([0.0, 0.0, push + drift * (t - 100.0), 0.0, 0.0, 0.0])
+
+    bench = pressing()
+    streaming = StreamingSensor(bench.clock, feel)
+    streaming.start(100.0)
+    bench.sensor.poll = streaming.poll
+    assert bench.run().reason == DONE
+    seeks = next(row.t for row in bench.rows if row.contact == "seeking")
+    found = bench.loop.pressing.facts()["contact"]["zero_drift"]
+    assert found == pytest.approx(drift * (bench.rows[-1].t - seeks), abs=0.02)
 
 
 @pytest.mark.slow

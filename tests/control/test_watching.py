@@ -99,9 +99,39 @@ def test_a_row_that_was_never_sent_has_no_lateness_to_show():
         assert "late" not in drawn(theirs.read())
 
 
+def test_names_with_brackets_and_colons_are_shown_as_they_are():
+    seen = {"title": "executing", "t": 0.0, "state": "stroke  a[red]:100:[/x]", "reason": "[b]"}
+    text = drawn(seen)
+    assert "a[red]:100:[/x]" in text
+    assert "[b]" in text
+
+
 def test_there_is_nothing_to_see_before_the_first_row():
     with mirrored(logged(0)) as theirs:
         assert theirs.read() is None
+
+
+def test_a_picture_waits_for_the_next_row_as_long_as_one_is_due():
+    log = logged(0)
+    with mirrored(log) as theirs:
+        add(log, range(1))
+        theirs.await_next()  # nobody writes: two periods, and it goes on
+        assert theirs.read()["t"] == 0.0
+        over = threading.Event()
+
+        def write():
+            k = 1
+            while not over.wait(0.001):
+                add(log, [k])
+                k += 1
+
+        thread = threading.Thread(target=write)
+        thread.start()
+        before = theirs._number[0]
+        theirs.await_next()
+        assert theirs._number[0] != before
+        over.set()
+        thread.join()
 
 
 def test_a_row_is_read_whole_or_not_at_all():

@@ -1,5 +1,7 @@
 """The force along a stroke as a seventh primitive: what is learned of it, and what is drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -180,3 +182,18 @@ def test_heights_of_a_stroke_all_in_contact_are_0_and_in_the_air_untouched():
     w = np.linspace(-3.0, 5.0, 50)
     np.testing.assert_array_equal(unsprung(w, np.full(50, 2.0)), np.zeros(50))
     np.testing.assert_array_equal(unsprung(w, np.zeros(50)), w)
+
+
+def test_of_several_the_one_without_force_is_named():
+    good, air = pressed_stroke(samples=201), pressed_stroke(lambda t: 0.0 * t, samples=201)
+    bare = replace(good, contact_force=None)
+    for others, number in (([good, bare], 2), ([bare, good], 1), ([good, good, air], 3)):
+        with pytest.raises(InputError, match=f"^demonstration {number}: --force-profile"):
+            fit(others, FitOptions(force_profile=True, normal=NORMAL))
+
+
+def test_a_force_is_learned_whole_by_as_many_functions_as_it_has_samples():
+    stroke = pressed_stroke(samples=61)
+    skill = learned(stroke, basis=241, trim=False)
+    t = np.linspace(0.0, DURATION, 61)
+    np.testing.assert_allclose(skill.taught_force(t), taught(t), atol=1e-3)

@@ -63,7 +63,7 @@ from dmpcli.surfaces.keep_off import KeepOff
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
 from tests import cases, human_strokes
-from tests.dmp import recordings
+from tests.dmp import recordings, varied
 from tests.dmp.strokes import circle, paper_stroke
 from tests.kept import Kept
 
@@ -1046,6 +1046,10 @@ def what_is_meant_where_nothing_is_said():
         found.append(contact_heights.ContactHeights(band, 0.0, 0.0, depth, 1.0, 0.0).deep)
     t = np.linspace(0.0, 1.0, 9)
     return [*found, [demonstrations.through(t[:n], t[:n, None]).k for n in range(2, 10)]]
+
+
+for more in varied.CASES:
+    KEPT.case(more)
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dmpcli.dmp.learning import fit
+from dmpcli.dmp.learning import _beyond_noise, fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.errors import InputError
 from dmpcli.spatial import rotations
@@ -308,3 +308,13 @@ def test_the_largest_angle_between_what_was_shown_and_what_is_drawn_is_told():
             assert 0.0 < told.angle < np.radians(1.0)
     still = fit([Trajectory(paper_stroke().t, paper_stroke().position)], FitOptions())
     assert not still.reproductions[0].angle
+
+
+@pytest.mark.parametrize(("sigma", "count"), [(0.0, 9), (0.1, 9), (0.1, 400), (2.0, 400)])
+def test_what_noise_explains_is_two_of_its_three_components_and_some_doubt(sigma, count):
+    distance = np.tile([0.5, 0.7, 0.9], count)[:count]
+    rms, largest = _beyond_noise(distance, sigma)
+    mean = np.mean(distance**2)
+    left = mean - 2.0 * sigma**2 * (1.0 + 3.0 / np.sqrt(count))
+    assert rms == pytest.approx(np.sqrt(max(left, 0.0)))
+    assert largest == pytest.approx(max(0.9 - 4.5 * sigma, 0.0))

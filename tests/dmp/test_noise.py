@@ -127,3 +127,45 @@ def test_few_samples_are_not_judged():
     t = times(1.0, 30.0)
     found = noise.estimate(noisy(wave(t), 0.3))
     assert (found.kind, found.total) == ("unknown", 0.0)
+
+
+def test_a_plateau_is_the_longest_level_stretch_before_a_fall():
+    stroke, level, floor = [9.0, 8.0, 7.0, 6.0], [2.0] * 7, [0.9, 0.0, -0.5, -0.5, -0.5]
+    assert noise._level_stretch(stroke + level + floor) == (4, 11)
+    # It need not begin behind the stroke, must fall by 1.5 decades behind itself, and stay down.
+    assert noise._level_stretch(level + floor) == (0, 7)
+    assert noise._level_stretch([-3.0, *level, 1.2, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]) is None
+    assert noise._level_stretch([9.0, *level, 1.0, 0.0, 0.4, 2.0, 2.0]) is None
+    # Too short a stretch, and one that slopes.
+    assert noise._level_stretch([9.0, 7.0, 2.0, 2.0, 2.0, 2.0, 0.0, -1.0]) is None
+    sloping = (2.0 - 0.15 * np.arange(7)).tolist()
+    assert noise._level_stretch([9.0, *sloping, 0.0, -1.0, -2.0, -2.0]) is None
+    level_enough = (2.0 - 0.11 * np.arange(7)).tolist()
+    assert noise._level_stretch([9.0, *level_enough, 0.0, -1.0, -2.0, -2.0]) == (1, 8)
+
+
+@pytest.mark.parametrize("other", [0.6, 1.4, 1.6])
+def test_gaps_that_are_no_multiples_of_the_smallest_make_no_lattice(other):
+    """On either side of a whole number."""
+    up = np.cumsum(np.tile([1.0, 1.0 + other], 20))
+    column = np.r_[up, up[::-1], up][:, None]
+    assert noise._lattice_step(column, 10.0) is None
+    whole = np.cumsum(np.tile([1.0, 2.0], 20))
+    assert noise._lattice_step(np.r_[whole, whole][:, None], 10.0) == 1.0
+
+
+def test_the_coarsest_axis_tells_the_step_and_one_that_is_none_refuses_all():
+    rng = np.random.default_rng(3)
+    x = np.cumsum(rng.integers(-1, 2, (400, 2)), axis=0) * [0.1, 0.5]
+    assert noise._lattice_step(x, 10.0) == pytest.approx(0.5)
+    still = np.column_stack([x, np.zeros(400)])
+    assert noise._lattice_step(still, 10.0) == pytest.approx(0.5)
+    assert noise._lattice_step(np.column_stack([x, rng.normal(size=400)]), 10.0) is None
+
+
+def test_thirty_nine_samples_tell_no_noise_and_forty_do():
+    x = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
+    assert noise.estimate(x[:39]).kind == "unknown"
+    assert noise.estimate(x[:39]).total == 0.0
+    assert noise.estimate(x).kind == "white"
+    assert noise.estimate(x).typical == pytest.approx(0.1, rel=0.5)

@@ -93,3 +93,32 @@ def test_the_step_is_smooth():
     assert step(np.array([0.0, 0.5, 1.0])).tolist() == [0.0, 0.5, 1.0]
     r = np.linspace(0.0, 1.0, 101)
     assert step(r) == pytest.approx(minimum_jerk(r))
+
+
+def test_a_rest_may_fill_all_but_the_ends_of_a_stroke():
+    t = 0.06 * np.arange(7)
+    x = np.array([0.0, 100, 100, 100, 100, 100, 200])[:, None]
+    assert rests(t, x, 0.0) == [(1, 5)]
+    assert rests(t[:6], x[1:], 0.0) == []
+    assert rests(t[:6], x[:6], 0.0) == []
+
+
+def test_a_joint_is_blended_on_both_sides_and_moves_nothing_else():
+    u = np.r_[np.arange(101.0), np.full(20, 100.0), np.arange(101.0, 180.0)]
+    x = np.column_stack([u, np.where(np.arange(200) < 120, 0.0, 3.0)])
+    joined, kept = without(x, [(100, 120)])
+    assert kept.tolist() == [*range(101), *range(121, 200)]
+    assert joined[100] == pytest.approx(joined[101] - [1.0, 0.0], abs=0.2)
+    assert joined[100] == pytest.approx(0.5 * (x[100] + x[120]))
+    np.testing.assert_array_equal(joined[:97], x[:97])
+    np.testing.assert_array_equal(joined[105:], x[125:])
+
+
+def test_a_tool_turns_where_one_of_its_angles_moves_by_a_degree():
+    angles = np.zeros((30, 3))
+    angles[12, 1] = np.radians(1.1)
+    assert turning(angles, (5, 12))
+    assert turning(angles, (12, 20))
+    assert not turning(angles, (5, 11))
+    assert not turning(angles, (13, 20))
+    assert not turning(0.8 * angles, (5, 20))

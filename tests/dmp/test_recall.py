@@ -62,3 +62,23 @@ def test_what_the_papers_smoothing_took_counts_as_its_error():
     )
     assert found.rms > 2.0 * better.rms
     assert np.isfinite(found.largest)
+
+
+def test_a_stroke_of_less_than_a_millimetre_is_recalled_as_one_of_any_length():
+    """Along the line the skill is scaled to it; across it keeps its wave."""
+    result = fit([paper_stroke()], FitOptions())
+    one = taught(paper_stroke())
+    found = recalled(result.skill, one)
+    for share in (0.004, 2.0):
+        x = one.curve.spline.c * [share, *[1.0] * 5]
+        curve = replace(one.curve, spline=one.curve.spline.construct_fast(
+            one.curve.spline.t, x, one.curve.spline.k))  # fmt: skip
+        other = recalled(result.skill, replace(one, curve=curve, length=share * one.length))
+        assert other.rms == pytest.approx(found.rms, rel=1e-6)
+        assert other.wave == pytest.approx(found.wave, rel=1e-9)
+
+
+def test_a_stroke_of_no_length_is_not_scaled():
+    result = fit([paper_stroke()], FitOptions())
+    one = taught(paper_stroke())
+    assert recalled(result.skill, replace(one, length=0.0)).rms == recalled(result.skill, one).rms

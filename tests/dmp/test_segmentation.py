@@ -176,3 +176,71 @@ def test_human_strokes_have_no_approach_and_no_pause():
         stroke = human_strokes.strokes(shape)[0]
         found = segments(stroke.t, stroke.position)
         assert (found.approach, found.retract, found.pauses) == (None, None, ()), shape
+
+
+def test_what_bends_by_a_tenth_of_its_chord_is_straight_and_more_is_not():
+    arch = np.array([[0.0, 0, 0], [5, 1, 0], [5, 1, 0], [10, 0, 0]])
+    assert segmentation._straight(arch) == 3
+    assert segmentation._straight(arch * [1.0, 1.001, 1.0]) == 2
+    assert segmentation._bend(arch) == 0.1
+    assert segmentation._bend(np.r_[arch, arch[:1]]) == np.inf
+
+
+def test_runs_of_flags_are_told_by_their_begins_and_ends():
+    flags = np.array([1, 1, 0, 1, 0, 1, 1, 1], dtype=bool)
+    assert segmentation._runs(flags) == ([0, 3, 5], [2, 4, 8])
+    assert [segmentation._first_run(flags, n) for n in (1, 2, 3, 4)] == [0, 0, 5, None]
+    assert segmentation._runs(np.zeros(3, dtype=bool)) == ([], [])
+
+
+def test_a_time_midway_between_samples_names_those_on_either_side():
+    t = np.arange(11.0)
+    stroke = Trajectory(t, np.outer(t, np.ones(3)), contact_force=np.outer(t, [0, 0, 1.0]))
+    assert segmentation.cut(stroke, until=4.5).position[-1, 0] == 5.0
+    assert segmentation.cut(stroke, until=4.4).position[-1, 0] == 4.0
+    assert segmentation.cut(stroke, start=4.5).position[0, 0] == 4.0
+    assert segmentation.cut(stroke, start=4.6).position[0, 0] == 5.0
+    for pause, left in (((2.5, 6.5), [0, 1, 2, 3, 8, 9, 10]), ((2.4, 6.4), [0, 1, 2, 7, 8, 9, 10])):
+        part = segmentation.cut(stroke, pauses=(pause,))
+        assert part.position[:, 0].tolist() == left
+        assert part.contact_force[:, 2].tolist() == left
+        assert part.t.tolist() == list(range(7))
+    assert segmentation.cut(stroke, 0.0, 10.0) is stroke
+
+
+def test_small_turns_in_the_time_of_a_rest_are_none():
+    """What comes back to its place after 0.3 s, again and again, has no net way."""
+    t = 0.01 * np.arange(600)
+    a = 2.0 * np.pi * t / 0.3
+    turns = np.column_stack([0.05 * t + 2.0 * np.sin(a), 2.0 * np.cos(a), 0.0 * t])
+    way = jerk(np.arange(150) / 150)[:, None] * [90.0, 0.0, 0.0]
+    points = np.r_[turns[0] - way[:0:-1], turns, turns[-1] + way[1:]]
+    assert segments(0.01 * np.arange(len(points)), points).pauses == ()
+
+
+@pytest.mark.parametrize("length", [18.0, 22.0, 40.0])
+def test_short_approaches_to_a_long_stroke_end_at_its_corner(length):
+    """They end within the first few of the points along the path that are looked at."""
+    legs = np.column_stack([10.0 * np.arange(31), 90.0 * (np.arange(31) % 2), np.zeros(31)])
+    way = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(legs, axis=0), axis=1))]
+    s = np.linspace(0.0, way[-1], 1200)
+    main = np.column_stack([np.interp(s, way, c) for c in legs.T])
+    q = np.linspace(1.0, 0.0, 21)[:-1, None]
+    down, up = main[0] + q * [0, 0, length], main[-1] + q[::-1] * [0, 0, length]
+    points = np.r_[down, main, up]
+    found = segments(0.01 * np.arange(len(points)), points)
+    assert found.approach == (0.0, pytest.approx(0.2, abs=0.03))
+    assert found.retract == (pytest.approx(12.19, abs=0.03), pytest.approx(12.39))
+
+
+@pytest.mark.parametrize(("bottom", "told"), [(25.0, False), (30.0, False), (33.0, True)])
+def test_between_two_strays_a_twentieth_of_the_points_must_be_left(bottom, told):
+    """Each of them reaches around its corner as far as a straight line may bend."""
+    V = np.array([[0, 0, 100], [0, 0, 0], [bottom, 0, 0], [bottom, 0, 90]], dtype=float)
+    way = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+    s = way[-1] * jerk(np.arange(301) / 300)
+    found = segments(
+        np.arange(301) / 100, np.column_stack([np.interp(s, way, c) for c in V.T]), DOWN
+    )
+    assert (found.approach is not None) == told
+    assert (found.retract is not None) == told

@@ -140,3 +140,19 @@ def test_the_order_of_demonstrations_gives_the_same_normals(order):
     plain = stroke_planes(strokes, [None] * 4, 0.0, False).normals
     mixed = stroke_planes([strokes[i] for i in order], [None] * 4, 0.0, False).normals
     np.testing.assert_allclose(mixed, plain[list(order)], atol=1e-12)
+
+
+@pytest.mark.parametrize("off", [[0.0, 0, 0], [500.0, 0, 0], [0.0, 300, -200]])
+def test_a_way_there_and_back_tells_no_plane_wherever_it_lies(off):
+    back = np.r_[FLAT, FLAT[::-1]] * [1.0, 0.02, 1.0] + off
+    plane = found(back @ cases.about("z", 90.0).T, closed=True)
+    assert plane.rule == "base"
+    assert plane.guessed
+    assert angle(plane.normals[0], UP) < 0.01
+
+
+@pytest.mark.parametrize("off", [[0.0, 0, 0], [800.0, -500, 300]])
+def test_the_plane_of_a_closed_stroke_does_not_depend_on_where_it_lies(off):
+    plane = found(ROUND @ cases.about("x", 25.0).T + off, closed=True)
+    assert angle(plane.normals[0], tilted(25.0)) < 0.01
+    assert plane.inside == 1.0

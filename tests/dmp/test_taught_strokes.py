@@ -11,6 +11,7 @@ from dmpcli.dmp.preprocessing import preprocess
 from dmpcli.dmp.skill import TaskFrame
 from dmpcli.dmp.taught_strokes import mean_frame, taught_strokes
 from dmpcli.errors import InputError, RefusedError
+from dmpcli.spatial import rotations
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
@@ -154,3 +155,59 @@ def test_the_goal_of_closed_strokes_is_the_mean_of_their_gaps():
     mean = mean_frame([SimpleNamespace(frame=frame) for frame in frames], True)
     assert mean.goal.tolist() == [2.0, 1.0, 1.0]
     assert mean.rotation is None
+
+
+def pressed(up=6.0):
+    """A wave on z = 0 by a pen that gives way the more the nearer to the goal, turned by 30°."""
+    t, u = cases.T6, cases.U6
+    force = 3.0 + up * u
+    x = np.column_stack([120 * u, 20 * np.sin(6 * u), -force / 4.0]) @ cases.about("y", 30.0).T
+    R = np.tile(cases.about("y", 30.0) @ np.diag([1.0, -1.0, -1.0]), (len(t), 1, 1))
+    felt = force[:, None] * cases.about("y", 30.0)[:, 2]
+    return Trajectory(t, x, R, contact_force=felt)
+
+
+@pytest.mark.parametrize("length", [0.2, 1.0, 5.0])
+def test_a_named_normal_may_be_of_any_length(length):
+    normal = tuple(length * cases.about("y", 30.0)[:, 2])
+    [found], _, _ = taught_strokes([preprocess(pressed())], FitOptions(normal=normal), None)
+    np.testing.assert_allclose(found.frame.axes[:, 2], cases.about("y", 30.0)[:, 2], atol=1e-6)
+    np.testing.assert_allclose(found.curve(cases.T6)[:, 2], 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.force[[0, -1]], [3.0, 9.0], atol=0.01)
+
+
+def test_tools_that_face_opposite_ways_have_no_mean_and_the_first_stands():
+    turns = [np.eye(3), np.diag([1.0, -1.0, -1.0])]
+    frames = [TaskFrame(np.zeros(3), np.array([9.0, 0, 0]), np.eye(3), R) for R in turns]
+    for some in (frames, frames[::-1]):
+        mean = mean_frame([SimpleNamespace(frame=frame) for frame in some], False)
+        np.testing.assert_array_equal(mean.rotation, some[0].rotation)
+
+
+def test_charts_that_face_opposite_ways_have_no_mean_and_the_first_in_space_stands():
+    places = [np.array([5.0, 1, 0]), np.array([-2.0, 7, 0])]
+    turns = [np.eye(3), np.diag([1.0, -1.0, -1.0])]
+    frames = [
+        TaskFrame(at, at + 9.0 * C[:, 0], C, None) for at, C in zip(places, turns, strict=True)
+    ]
+    for some in (frames, frames[::-1]):
+        mean = mean_frame([SimpleNamespace(frame=frame) for frame in some], False)
+        np.testing.assert_array_equal(mean.start, places[1])
+        np.testing.assert_array_equal(mean.axes, turns[1])
+        np.testing.assert_allclose(mean.goal, places[1] + 9.0 * turns[1][:, 0])
+
+
+def test_a_closed_stroke_with_its_tool_keeps_its_shape_on_the_plane_it_was_taught_on():
+    ring = circle()
+    tilt = rotations.from_euler(np.array([0.2, -0.1, 0.4]))
+    R = np.tile(tilt @ np.diag([1.0, -1.0, -1.0]), (len(ring.t), 1, 1))
+    one = Trajectory(ring.t, ring.position, R)
+    named = Plane(ring.position[0] - 2.0 * tilt[:, 2], tilt[:, 2])
+    [a], _, closed = taught_strokes([preprocess(one)], FitOptions(), named)
+    [b], _, _ = taught_strokes([preprocess(one)], FitOptions(), None)
+    assert closed
+    x, y = a.curve.even(60), b.curve.even(60)
+    np.testing.assert_allclose(x[:, 2], 2.0, atol=0.01)
+    np.testing.assert_allclose(np.hypot(x[:, 0] - y[:, 0], x[:, 1] - y[:, 1]), 0.0, atol=0.02)
+    assert np.ptp(x[:, 0]) == pytest.approx(60.0, abs=0.3)
+    np.testing.assert_allclose(x[:, 3:], 0.0, atol=1e-6)

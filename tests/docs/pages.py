@@ -14,7 +14,9 @@ PAGES = [
 """Without the reference, which is made from the program, with examples that run elsewhere."""
 
 ELSEWHERE = {
-    "make ": "the Makefile's targets: tests/tools, tests/docs/test_makefiles.py, .ci/run",
+    "make ": "the Makefile's targets: tests/tools, tests/docs/test_makefiles.py, .ci/run; that "
+    "each is one, test_commands_of_pages_that_take_long_are_understood",
+    ".venv/bin/python -m tools.mutants": "tests/tools/test_mutants.py; its words as above",
     "python3 -m venv": "the set-up: tests/tools/test_set_up.py, make dist",
     "dmpcli-env/bin/": "the set-up without make: make dist tries the wheel",
     ". .venv/bin/activate": "the reader's own shell",

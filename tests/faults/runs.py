@@ -110,6 +110,8 @@ def folder() -> Path:
     """A folder with what the commands read."""
     made = Path(tempfile.mkdtemp(prefix="dmpcli-faults-"))
     (made / "pen.json").write_bytes(tool.encode(PEN))
+    # The plate lies where the plan says; to seek it 10 mm about would take as long as 20 strokes.
+    (made / "pressed.toml").write_text("[execute]\ncoupling_reach = 2.0\n")
     for name, (scale, samples) in STROKES.items():
         t = 0.02 * np.arange(samples)
         u = t / t[-1]
@@ -222,6 +224,7 @@ def _words(command: str, stroke: str, output: Path) -> list[str]:
         words += ["--goal-from", "udp://:9870"]
     if command.endswith("pressed"):
         words += [*felt, "--coupling", "force", "--force-setpoint", "2"]
+        words += ["--config", str(made / "pressed.toml")]
     return words
 
 

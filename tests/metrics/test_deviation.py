@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmpcli.metrics import deviation
 from dmpcli.metrics.deviation import Taught, nearest_distance, nearest_rms
 
 
@@ -128,3 +129,27 @@ def test_the_nearest_place_is_found_however_far_along_the_demonstration_it_is(ki
         far = brute(stroke, taught * [factor, 1.0, 1.0])
         assert found.nearest_max[i] == pytest.approx(far.max(), abs=1e-7)
         assert found.nearest_rms[i] == pytest.approx(np.sqrt(np.mean(far**2)), abs=1e-7)
+
+
+def test_clearances_are_the_least_distances_to_segments_beyond_each_reach():
+    rng = np.random.default_rng(7)
+    place = np.cumsum(rng.normal(size=(22, 3)), axis=0)
+    place[12] = place[11]  # a segment of no length
+    found = deviation._clearance(place)
+    for known, reach in zip(found, deviation._REACHES, strict=True):
+        for i in range(0, 22, 3):
+            beyond = [k for k in range(21) if k < i - reach or k >= i + reach]
+            far = [brute(place[i : i + 1], place[k : k + 2])[0] for k in beyond]
+            assert known[i] == pytest.approx(min(far, default=np.inf), abs=1e-7)
+            assert known[i] <= min(far, default=np.inf)
+
+
+def test_clearances_of_long_curves_are_those_of_their_parts():
+    """They are found in blocks."""
+    s = np.linspace(0.0, 1.0, 700)
+    place = np.column_stack([100 * s, 20 * np.sin(20 * s), 0 * s])
+    found = deviation._clearance(place)[0]
+    for i in (0, 46, 47, 699):
+        beyond = np.delete(np.arange(699), np.arange(max(i - 1, 0), min(i + 1, 699)))
+        far = min(brute(place[i : i + 1], place[k : k + 2])[0] for k in beyond)
+        assert found[i] == pytest.approx(far, abs=1e-7)

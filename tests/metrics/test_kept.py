@@ -19,6 +19,7 @@ from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
 from tests import cases, human_strokes
 from tests.kept import Kept
+from tests.metrics import varied
 
 KEPT = Kept(__file__)
 U = cases.jerk(np.linspace(0.0, 1.0, 241))
@@ -154,6 +155,10 @@ def contacts_and_times():
         timing.punctuality(0.02 * np.arange(80), late, 0.02),
         experiments,
     ]
+
+
+for more in varied.CASES:
+    KEPT.case(more)
 
 
 @pytest.mark.slow

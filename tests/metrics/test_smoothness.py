@@ -158,3 +158,50 @@ def test_uneven_samples_of_a_polyline_are_read_on_it():
     found = motion.log_dimensionless_jerk(finer, read, cutoff=None)
     expected = motion.log_dimensionless_jerk(even, at_even, cutoff=None)
     assert found == pytest.approx(expected, rel=1e-6, nan_ok=True)
+
+
+def test_a_spectrum_is_read_up_to_its_cutoff_and_that_line_too():
+    """Of 16 Hz the line at half the rate is the last, and loud where a stroke goes by jerks."""
+    t = np.arange(33) / 16.0
+    jerky = np.cumsum(np.where(np.arange(33) % 2, 3.0, 1.0))
+    strokes = np.stack([jerky, 0.5 * jerky, 0 * jerky])[:, None]
+    speed = np.linalg.norm(np.diff(strokes[:, 0]), axis=0) * 16.0
+    for cutoff in (8.0, 7.5):
+        found = motion._sparc(1 / 16.0, strokes, cutoff)[0]
+        assert found == pytest.approx(sparc_as_published(speed, 16.0, cutoff), rel=1e-9)
+    assert motion._sparc(1 / 16.0, strokes, 8.0)[0] < motion._sparc(1 / 16.0, strokes, 7.5)[0]
+    assert (
+        motion.spectral_arc_length(t, strokes, 8.0)[0] == motion._sparc(1 / 16.0, strokes, 8.0)[0]
+    )
+
+
+def test_the_arc_ends_at_the_last_loud_line():
+    spectra = np.array([[1, 0.5, 0.04, 0], [1, 0.04, 0.05, 0], [1, 0.01, 0, 0], [1, 0.8, 0.6, 0.5]])
+    found = motion._arc(spectra)
+    assert found[0] == pytest.approx(-np.hypot(1.0, 0.5))
+    assert found[1] == pytest.approx(-np.hypot(0.5, 0.96) - np.hypot(0.5, 0.01))
+    assert np.isnan(found[2])
+    assert found[3] == pytest.approx(-sum(np.hypot(1 / 3, d) for d in (0.2, 0.2, 0.1)))
+
+
+def test_no_line_is_loud_beyond_the_one_that_is_told():
+    """However few samples, and at the ends of a stroke that begins and stops at once."""
+    rng = np.random.default_rng(5)
+    for n in (5, 16, 61):
+        speed = np.abs(np.cumsum(rng.normal(size=(6, n)), axis=1)) + [
+            [0.0],
+            [9],
+            [0],
+            [9],
+            [0],
+            [9],
+        ]
+        size = 16 * 2 ** int(np.ceil(np.log2(n)))
+        told = motion._loud_at_most(speed, speed.sum(axis=1), size)
+        spectrum = np.abs(np.fft.rfft(speed, size)) / speed.sum(axis=1)[:, None]
+        last = np.array([np.flatnonzero(one >= 0.05)[-1] for one in spectrum])
+        assert (last <= told).all()
+        sine = 0.5 * np.sqrt(1.000001 * np.abs(np.diff(np.pad(speed, ((0, 0), (2, 2))), 2)).sum(1)
+                             / (0.05 * speed.sum(axis=1)))  # fmt: skip
+        bound = np.where(sine < 1, np.arcsin(np.minimum(sine, 1)) / np.pi, 0.5) * size
+        np.testing.assert_allclose(told, np.ceil(bound))

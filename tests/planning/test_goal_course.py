@@ -147,6 +147,7 @@ def test_a_limit_that_is_met_exactly_is_kept_and_one_that_is_missed_by_a_roundin
 def test_a_step_where_a_course_leaves_the_one_before_is_seen_from_the_first_set_point_on():
     """From set-point 0 too, before which the arm stands there."""
     made = goal_course.moved(BASE, FIRST, FILTER, np.array([10.0, 0.0, 0.0]), 0)
+    assert made is not None
     position = made.plan.position.copy()
     position[1:] += [0.5, 0.0, 0.0]
     jumped = dataclasses.replace(made, plan=dataclasses.replace(made.plan, position=position))

@@ -191,6 +191,7 @@ def goals_that_move():
     course, found = goal_course.first(base, joints), []
     for at, shift in ((10, [4.0, -3.0, 0.0]), (60, [-9.0, 2.0, 0.0]), (97, [30.0, 0.0, 1.0])):
         made = goal_course.moved(base, course, filter_, np.array(shift), at)
+        assert made is not None
         found += [made.plan, made.states, made.goal, goal_course.slices(course, at, filter_)]
         for limits in (WIDE, replace(WIDE, workspace=TIGHT.workspace), TIGHT):
             *more, last = goal_course.judged(made, course, limits, reach)

@@ -1,5 +1,7 @@
 """The margin to a border is measured along the surface: against closed forms."""
 
+import pickle
+
 import numpy as np
 import pytest
 import trimesh
@@ -76,3 +78,34 @@ def test_only_what_is_looked_at_is_told_and_a_closed_mesh_has_no_border():
     points = np.array([[[1.0, 30.0, 0.0], [2.0, 30.0, 0.0]]])
     found = BorderMargin(plate, 5.0).holds(points, np.array([[True, False]]))
     assert found.tolist() == [[True, False]]
+
+
+def test_a_border_is_found_beside_a_nearer_one_that_only_the_air_leads_to():
+    """Two sheets that meet at a sharp fold: near one's own border the other sheet's is nearer."""
+    a = np.radians(160.0)
+
+    def point(s, y):
+        over = np.maximum(s, 0.0)
+        return np.stack([np.minimum(s, 0.0) + over * np.cos(a), y, -over * np.sin(a)], axis=-1)
+
+    V, F = fields.grid(point, 31, 21, (-30.0, 30.0), (-20.0, 20.0))
+    # The lower sheet ends 8 mm before the fold.
+    low = V[F].mean(axis=1)[:, 2] < -10.5 * np.sin(a) * 0.8
+    mesh = Mesh(V, F[~low])
+    s = np.array([-8.0, -8.0, -8.0])
+    y = np.array([17.0, 15.0, 0.0])
+    found = held(mesh, np.stack([s, y, 0 * s], axis=-1), 4.0)
+    assert found.tolist() == [True, False, False]
+    through_air = np.linalg.norm(point(np.array([-8.0]), y[:1]) - mesh.V[np.unique(
+        BorderMargin(mesh, 4.0).edges)], axis=1).min()  # fmt: skip
+    assert through_air < 3.5
+
+
+def test_a_margin_travels_to_other_processes_without_its_tree():
+    V = np.array([[0.0, 0, 0], [100, 0, 0], [100, 60, 0], [0, 60, 0]])
+    margin = BorderMargin(Mesh(V, np.array([[0, 1, 2], [0, 2, 3]])), 5.0)
+    points, looked = np.array([[[4.0, 30, 0], [6.0, 30, 0]]]), np.ones((1, 2), dtype=bool)
+    first = margin.holds(points, looked)
+    again = pickle.loads(pickle.dumps(margin))
+    assert again.margin == 5.0
+    assert again.holds(points, looked).tolist() == first.tolist() == [[True, False]]

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmpcli.surfaces import inverse_chart
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.plane import Plane
@@ -201,3 +202,32 @@ def test_a_sphere_off_its_centre_is_exact():
     assert u == pytest.approx(40.0 * np.pi / 4, abs=1e-6)
     assert v == pytest.approx(0.0, abs=1e-6)
     assert w == pytest.approx(5.0, abs=1e-6)
+
+
+def test_neighbours_are_of_other_turns_beyond_five_times_their_way_and_ten_millimetres():
+    coordinates, position = np.zeros((4, 3, 3)), np.zeros((4, 3, 3))
+    coordinates[0, 1:, 0] = 10.0
+    coordinates[1, 2:, 1] = 10.01
+    coordinates[2, 1:, 0], position[2, 1:, 2] = 19.9, 2.0
+    coordinates[3, 1:, 2] = 50.0
+    assert inverse_chart._jumps(coordinates, position).tolist() == [False, True, False, False]
+
+
+def test_what_is_not_good_is_put_between_good_neighbours_each_stroke_by_itself():
+    at = np.arange(24.0).reshape(3, 4, 2) ** 2
+    good = np.array([[1, 0, 0, 1], [0, 0, 0, 0], [0, 1, 1, 0]], dtype=bool)
+    found = inverse_chart._between(at, good)
+    np.testing.assert_allclose(found[0], np.linspace(at[0, 0], at[0, 3], 4))
+    assert not found[1].any()
+    np.testing.assert_array_equal(found[2], at[2, [1, 1, 2, 2]])
+    np.testing.assert_array_equal(inverse_chart._between(at, np.ones((3, 4), dtype=bool)), at)
+
+
+def test_what_is_reached_is_told_by_truth_values():
+    """So that `~` turns it over."""
+    start = np.zeros((2, 3))
+    charts = EXACT["sphere"].charts(start, np.array([[0.0, 0.0, -300.0], [50.0, 0.0, 0.0]]))
+    found = invert(charts, np.zeros((2, 5, 3)))
+    assert found.reached.dtype == bool
+    assert (~found.reached).sum() == 5
+    assert found.complete.tolist() == [False, True]

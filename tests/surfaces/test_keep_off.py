@@ -54,3 +54,21 @@ def test_what_was_outside_stays_so_and_is_not_near_the_border_besides():
     KeepOff(None, (Beyond(0, 0.5),)).marked(strokes(), before, status)
     assert np.array_equal(before, given)
     assert np.array_equal(status, STATUS)
+
+
+def test_what_any_of_several_regions_holds_is_kept_out():
+    class Band:
+        def __init__(self, low, high):
+            self.low, self.high = low, high
+
+        def holds(self, points):
+            return (points[..., 0] > self.low) & (points[..., 0] < self.high)
+
+    x = np.arange(10.0)
+    position = np.stack([np.stack([x, 0 * x, 0 * x], -1), np.stack([x + 20, 0 * x, 0 * x], -1)])
+    off = KeepOff(None, (Band(1.5, 3.5), Band(6.5, 7.5), Band(50.0, 60.0)))
+    free = np.zeros((2, 1), dtype=bool)
+    outside, status = off.marked(position, free, np.zeros(2, dtype=np.int64))
+    assert np.flatnonzero(outside[0]).tolist() == [2, 3, 7]
+    assert not outside[1].any()
+    assert status.tolist() == [Status.KEPT_OUT, Status.DRAWN]

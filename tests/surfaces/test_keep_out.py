@@ -8,6 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.path import Path
+from scipy.spatial import Delaunay
 
 from dmpcli.errors import InputError
 from dmpcli.surfaces.cylinder import Cylinder
@@ -136,3 +137,21 @@ def test_lines_without_an_inside_are_refused():
     hole = Mesh(plate.V, plate.F[np.linalg.norm(plate.V[plate.F].mean(1) - [5, 1, 0], axis=1) > 2])
     with pytest.raises(InputError, match="leaves the mesh between its points 1 and 2"):
         enclosed(hole, far)
+
+
+def test_around_a_hole_with_a_fine_rim_the_hole_s_side_is_the_inside():
+    """The border is weighed by its length, not by how many edges it has."""
+    a = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    ring = np.column_stack([np.cos(a), np.sin(a)])
+    corners = np.array([[-40, -40], [40, -40], [40, 40], [-40, 40]], dtype=float)
+    flat_ = np.concatenate([4.0 * ring, 12.0 * ring[::4], 25.0 * ring[::6], corners])
+    F = Delaunay(flat_).simplices
+    F = F[np.linalg.norm(flat_[F].mean(axis=1), axis=1) > 4.0]
+    u, v = flat_[F[:, 1]] - flat_[F[:, 0]], flat_[F[:, 2]] - flat_[F[:, 0]]
+    turn = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    F = np.where(turn[:, None] > 0.0, F, F[:, ::-1])
+    for shift in ([0.0, 0, 0], [900.0, 400, -300]):
+        mesh = Mesh(np.column_stack([flat_, 0 * flat_[:, 0]]) + shift, F)
+        region = enclosed(mesh, np.column_stack([18.0 * ring[::3], 0 * a[::3]]) + shift)
+        points = np.array([[8.0, 3, 0], [-16.0, 0, 0], [20.0, 0, 0], [35.0, 35, 0]]) + shift
+        assert region.inside(points).tolist() == [True, True, False, False]

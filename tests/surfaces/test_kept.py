@@ -47,7 +47,7 @@ from dmpcli.surfaces.thin_walls import mistaken
 from dmpcli.surfaces.topology import Topology
 from tests.kept import Kept
 from tests.records.meshes import grid
-from tests.surfaces import cases, fields
+from tests.surfaces import cases, fields, varied
 from tests.surfaces.test_mesh import folded
 
 KEPT = Kept(__file__)
@@ -590,6 +590,10 @@ def lines_shot():
         ]
         found.append(straightest_geodesics.walk(mesh, start, aim.direction, np.full(4, 20.0)))
     return found
+
+
+for more in varied.CASES:
+    KEPT.case(more)
 
 
 @pytest.mark.slow

@@ -168,3 +168,27 @@ def test_a_kernels_arctangent_is_exact_to_rounding():
         assert abs(arctan2(y, x) - np.arctan2(y, x)) <= 1e-15
     assert arctan2(0.0, 0.0) == 0.0
     assert arctan2(-1e-17, -1.0) == pytest.approx(np.pi)
+
+
+def test_vertices_that_lie_on_one_another_are_marked_and_of_a_smooth_mesh_none():
+    from dmpcli.surfaces.kernels.mesh import Geometry, _split
+
+    for mesh in (plate_with_fin(2, 6)[0], cases.mesh("saddle", 200)):
+        topology = mesh.topology
+        geometry = Geometry(
+            mesh.F,
+            mesh.corners,
+            mesh.face_normals,
+            mesh.corner_normals,
+            mesh.reach,
+            mesh.components,
+            topology.neighbours,
+            topology.border,
+            topology.border_vertices,
+        )
+        apart = np.linalg.norm(mesh.V[:, None] - mesh.V, axis=2) + 9.0 * np.eye(len(mesh.V))
+        twice = apart.min(axis=1) < 1e-9
+        assert twice.any() == (len(mesh.slits) > 0)
+        marked = _split(geometry)
+        assert marked[twice].all()
+        assert marked.sum() <= 2 * twice.sum()

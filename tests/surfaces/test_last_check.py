@@ -160,3 +160,35 @@ def test_strokes_anywhere_on_machined_parts_are_drawn_right_or_refused(name, rea
     lean = np.abs(np.sum(mesh.face_normals[hits.face] * lift.normal[drawn], axis=-1))
     # Right on an edge the nearest facet may be the other one.
     assert np.mean(lean >= np.cos(np.radians(25.0))) >= 0.999
+
+
+@pytest.mark.parametrize("at", [29, 30])
+def test_of_two_samples_the_one_where_the_chart_is_wider_counts(at):
+    """A step of 3.5 mm for 1 mm of the chart, which is four times as wide on one side of it."""
+    _, feet = sheet(60)
+    step = np.ones((1, 60, 1)) * np.arange(60.0)[None, :, None]
+    coordinates = step * [1.0, 0.0, 0.0]
+    position = coordinates + [-30.0, 0.0, 0.0]
+    position[0, 30:, 0] += 3.5
+    stretch = np.ones((1, 60))
+    one = replace(feet, coordinates=coordinates, position=position, stretch=stretch)
+    assert np.flatnonzero(last_check._jumps(one)[0]).tolist() == [29]
+    stretch[0, at] = -4.0
+    assert not last_check._jumps(one).any()
+    stretch[0, at], stretch[0, 0], stretch[0, -1] = 1.0, 9.0, 9.0
+    assert last_check._jumps(one).sum() == 1
+
+
+def test_both_points_beside_a_tear_are_unsound_and_what_leans_beyond_the_border_is_not():
+    mesh, feet = sheet(60)
+    torn = moved(feet, slice(30, None), [0.0, 20.0, 0.0])
+    assert np.flatnonzero(last_check.unsound(mesh, torn)[0]).tolist() == [29, 30]
+    off = moved(feet, 7, [0.0, 0.0, 0.002])
+    assert np.flatnonzero(last_check.unsound(mesh, off)[0]).tolist() == [7]
+    assert not last_check.unsound(mesh, moved(feet, 7, [0.0, 0.0, 0.0005])).any()
+    normal = feet.normal.copy()
+    normal[0, 9:12] = [0.6, 0.0, 0.8]
+    outside = feet.outside.copy()
+    outside[0, 10] = True
+    leaning = replace(feet, normal=normal, outside=outside)
+    assert np.flatnonzero(last_check.unsound(mesh, leaning)[0]).tolist() == [9, 11]

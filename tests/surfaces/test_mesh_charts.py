@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from dmpcli.spatial import rotations
+from dmpcli.surfaces import mesh_charts
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.surface import Status
@@ -282,3 +284,54 @@ def test_folds_of_a_noisy_scan_are_drawn_well_or_refused(degrees):
     assert (off[drawn] < 6.0 * sigma).all()
     assert not drawn.any() or degrees <= 30.0
     assert set(lift.status[~drawn]) <= {Status.NOISY, Status.NO_GEODESIC, Status.LOST}
+
+
+def course(step, back, turn=0.0):
+    """A stroke of one chart that comes back by `back` mm in the middle, in steps of `step` mm."""
+    count = round(10.0 / step)
+    there = np.arange(count + 1) * step
+    again = there[-1] - np.arange(1, round(back / step) + 1) * step
+    x = np.concatenate([there, again, again[-1:] + there[1:]] if len(again) else [there])
+    foot = np.stack([x, 0 * x, 0 * x], axis=-1)[None]
+    u = np.arange(len(x)) * step
+    coordinates = np.stack([u, 0 * u, 0 * u], axis=-1)[None]
+    axes = np.tile(np.eye(3), (1, len(x), 1, 1))
+    axes[0, count + 1 :: 2] = rotations.exp(np.radians(turn) * np.array([0.0, 1.0, 0.0]))
+    return mesh_charts._folded(foot, axes, coordinates).tolist()
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 1.0])
+def test_what_comes_back_along_its_line_by_more_than_a_third_of_a_millimetre_folds(step):
+    """However fine its steps are."""
+    assert course(step, 2.0) == [True]
+    assert course(step, 0.0) == [False]
+
+
+def test_what_comes_back_by_little_or_between_facets_that_lean_does_not_fold():
+    assert course(0.05, 0.25) == [False]
+    assert course(0.05, 0.4) == [True]
+    # The chord over an edge is in neither facet.
+    assert course(0.5, 2.0, 9.0) == [True]
+    assert course(0.5, 2.0, 11.0) == [False]
+
+
+def test_points_that_lean_out_over_a_border_by_little_of_their_height_are_over_the_mesh():
+    mesh = folded(0.0)
+    charts = mesh.charts(np.array([[-20.0, 0.0, 0.0]]), np.array([[20.0, 0.0, 0.0]]))
+    beside = np.array([[[61.3, 5, 0.0], [61.2, 5, 0.0], [64.5, 5, 20.0], [66.0, 5, 20.0]]])
+    assert charts.over(beside).tolist() == [[False, True, True, False]]
+    assert charts.over(beside * [-1.0, 1.0, -1.0]).tolist() == [[False, True, True, False]]
+    assert charts.over(beside - [30.0, 0, 0]).all()
+
+
+def test_a_goal_on_the_far_side_of_a_thin_plate_is_not_led_to_over_its_rim():
+    made = trimesh.creation.box((60.0, 40.0, 0.5)).subdivide()
+    mesh = Mesh(np.array(made.vertices), np.array(made.faces))
+    start = np.array([[25.0, 3.0, 0.25], [25.0, 3.0, 0.25]])
+    goal = np.array([[22.0, -6.0, -0.25], [22.0, -6.0, 0.25]])
+    charts = mesh.charts(start, goal)
+    assert charts.status.tolist() == [Status.OTHER_SIDE, Status.DRAWN]
+    thick = trimesh.creation.box((60.0, 40.0, 8.0)).subdivide()
+    block = Mesh(np.array(thick.vertices), np.array(thick.faces))
+    z = np.array([0.0, 0.0, 3.75])
+    assert block.charts(start[:1] + z, goal[:1] - z).status.tolist() == [Status.DRAWN]

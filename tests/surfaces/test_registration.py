@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
+from dmpcli.spatial.pose import Pose
+from dmpcli.surfaces import registration
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.registration import (
     RegisteredPart,
@@ -277,3 +279,43 @@ def test_points_of_another_size_than_the_part_are_refused_for_their_unit(scale):
     points = scale * touched_on(V, F, 20, np.random.default_rng(14))
     with pytest.raises(InputError, match="check the part's unit of length"):
         onto_surface(points, part, starts_near(points, np.eye(3), np.zeros(3)))
+
+
+def test_each_touch_out_of_the_part_costs_a_pose_the_square_of_the_limit():
+    V, F = box((100.0, 60.0, 40.0))
+    part = RegisteredPart.of(Mesh(V, F))
+    points = np.array([[x, y, 20.0] for x in (-30.0, 0.0, 30.0) for y in (-20.0, 0.0, 20.0)])
+    turned = np.diag([1.0, -1.0, -1.0])
+    poses = Pose(np.array([[0.0, 0, 0], [0.0, 0, 40.0]]), np.stack([np.eye(3), turned]))
+    squares = np.array([0.5, 0.2])
+    down = np.tile([0.0, 0.0, -1.0], (9, 1))
+    for wrong in range(10):
+        approach = down.copy()
+        approach[:wrong] *= -1.0
+        cost, used = registration._directed(points, part, poses, squares, approach, 3.0)
+        # The second pose is turned over: what came from above came out of it.
+        n = np.array([wrong, 9 - wrong])
+        found = squares + 9.0 * n
+        best = int(np.argmin(found))
+        assert used == (n[best] <= 0.2 * 9)
+        np.testing.assert_allclose(cost, found if used else squares)
+    assert registration._directed(points, part, poses, squares, None, 3.0) == (squares, False)
+
+
+@pytest.mark.parametrize("off", [[0.0, 0, 0], [5000.0, -300, 0]])
+def test_the_size_of_a_part_is_that_of_its_box_wherever_its_origin_is(off):
+    V, F = box((10.0, 6.0, 4.0))
+    part = RegisteredPart.of(Mesh(V + off, F))
+    registration._refuse_size(V, part)
+    registration._refuse_size(V[:2] * 0.1, part)
+    for wrong in (0.001 * V, 40.0 * V):
+        with pytest.raises(InputError, match="check the part's unit"):
+            registration._refuse_size(wrong, part)
+
+
+def test_a_shift_to_one_side_is_told_beyond_a_tenth_of_a_millimetre_and_doubt():
+    wave = np.sin(np.arange(25.0))
+    assert registration._one_sided(0.2 + 0.01 * wave) == pytest.approx(0.2, abs=0.01)
+    assert registration._one_sided(-0.2 - 0.01 * wave) == pytest.approx(-0.2, abs=0.01)
+    assert registration._one_sided(0.09 + 0.01 * wave) == 0.0
+    assert registration._one_sided(0.2 + 0.5 * wave) == 0.0

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -51,8 +52,47 @@ def test_where_no_patch_is_wide_enough_it_says_how_much_is_needed(folder):
     V, F = box((120.0, 20.0, 15.0))
     (folder / "narrow.stl").write_bytes(written(V - V.min(axis=0), F, "stl"))
     told, ways = proposed("narrow.stl")
+    # At a half of its size there is.
+    assert told[0].startswith("room for skill.json: --start")
+    assert "--amplitude scale" in told[0]
+    for words in ways:
+        ended("generalize", "skill.json", "-o", "a.parquet", "--surface", "narrow.stl", *words)
+    start, goal = np.array(ways[0][1:4], float), np.array(ways[0][5:8], float)
+    assert np.linalg.norm(goal - start) < 65.0
+    V, F = box((8.0, 6.0, 5.0))
+    (folder / "tiny.stl").write_bytes(written(V - V.min(axis=0), F, "stl"))
+    told, ways = proposed("tiny.stl")
     assert ways == []
-    assert "90 mm along, 24 mm across" in told[0]
+    assert "90 mm along, 24 mm across), nor for a quarter of its size" in told[0]
+
+
+@pytest.mark.slow
+def test_the_line_that_is_told_last_can_be_typed_as_it_stands(folder):
+    said = ended("inspect", "part.stl", "--for", "skill.json").stdout
+    line = re.search(r"^  (dmpcli generalize (?:.*\\\n)*.*)$", said, re.M)[1]
+    assert max(map(len, line.split("\n"))) <= 80
+    words = shlex.split(line.replace("\\\n", ""))
+    assert words[:5] == ["dmpcli", "generalize", "skill.json", "-o", "stroke.parquet"]
+    ended(*words[1:])
+    ended("execute", "stroke.parquet", "--dry-run", "--workspace", "-1e3", "1e3", "-1e3", "1e3",
+          "-1e3", "1e3")  # fmt: skip
+
+
+@pytest.mark.slow
+def test_on_a_wall_the_tool_is_turned_with_it(folder):
+    """Taught straight down, and drawn on a face of a thin plate that stands."""
+    wave = np.loadtxt(folder / "mine.csv", delimiter=",", skiprows=1)
+    rows = "\n".join(",".join(f"{value:.6f}" for value in [*row, np.pi, 0, 0]) for row in wave)
+    (folder / "mine.csv").write_text(f"t,x,y,z,rx,ry,rz\n{rows}\n")
+    ended("fit", "mine.csv", "-o", "skill.json", "--rotation", "euler")
+    V, F = box((6.0, 120.0, 60.0))
+    (folder / "wall.stl").write_bytes(written(V - V.min(axis=0), F, "stl"))
+    _, ways = proposed("wall.stl")
+    assert {"--orientation", "--start-orientation"} <= set(ways[0])
+    done = ended("generalize", "skill.json", "-o", "a.parquet", "--surface", "wall.stl", *ways[0])
+    assert "square" not in done.stderr
+    said = json.loads(ended("report", "a.parquet", "--surface", "wall.stl", "--json").stdout)
+    assert said["files"][0]["strokes"][0]["surface"]["tilt_max"] < 30.0
 
 
 def test_a_skill_is_drawn_on_meshes_only(folder):

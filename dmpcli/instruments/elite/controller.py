@@ -9,7 +9,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
-from dmpcli.instruments.elite.frames import Report
+from dmpcli.instruments.elite.frames import MonitorReport
 from dmpcli.instruments.elite.jsonrpc import Client
 from dmpcli.instruments.elite.monitor import Monitor
 from dmpcli.instruments.elite.requests import Params, Requests
@@ -345,7 +345,7 @@ class Controller:
         if not turned <= _STILL:
             raise RefusedError(f"{self.name}: moves {how}; stop that, or wait for its end")
 
-    def _powered(self, report: Report) -> bool:
+    def _powered(self, report: MonitorReport) -> bool:
         return report.servo_ready and report.motors_synchronised
 
     def _over_any(self, method: str, params: Params) -> None:
@@ -380,7 +380,7 @@ class Controller:
         except InstrumentError:
             return True
 
-    def _mode(self, report: Report, powered: bool) -> tuple[RobotMode, str]:
+    def _mode(self, report: MonitorReport, powered: bool) -> tuple[RobotMode, str]:
         """Whether the robot may move, and what there is to say of it."""
         if report.estop or report.state == _ESTOP:
             return "emergency stop", ""
@@ -396,5 +396,5 @@ class Controller:
             return "not ready", "its servos are off"
         return "ready", ""
 
-    def _degrees(self, report: Report) -> Floats:
+    def _degrees(self, report: MonitorReport) -> Floats:
         return np.degrees(report.joints) if self._settings.radians else report.joints

@@ -4,6 +4,7 @@ The layout is that of two public decoders, which agree; neither states a unit. S
 joint angles and the state is used, and the driver compares the angles with those of the JSON-RPC.
 """
 
+import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,20 @@ ALARMING = (2, 4, 5)
 
 _HEAD = SIZE.to_bytes(4, "big")
 _FLAGS = ("servo_ready", "motors_synchronised", "collision", "estop")
+_CODES = {"u1": "B", "i4": "i", "u4": "I", "u8": "Q", "f8": "d"}
+
+
+def _reader(*names: str) -> struct.Struct:
+    """What unpacks these fields of a frame, in its order: a tenth of the time of a numpy record."""
+    code = ">"
+    for name in FRAME.names or ():
+        field = FRAME[name]
+        count = int(np.prod(field.shape, dtype=int))
+        code += f"{count}{_CODES[field.base.str[1:]]}" if name in names else f"{field.itemsize}x"
+    return struct.Struct(code)
+
+
+_READ = _reader("size", "timestamp", "joints", "state", "mode", *_FLAGS, "word")
 
 
 class BadFrameError(Exception):
@@ -66,7 +81,7 @@ class BadFrameError(Exception):
 
 
 @dataclass(frozen=True)
-class Report:
+class MonitorReport:
     """What one frame says.
 
     Attributes
@@ -98,7 +113,7 @@ class Report:
         return self.estop or self.collision or self.state in ALARMING
 
 
-def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:
+def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> MonitorReport:
     """Read one frame.
 
     Parameters
@@ -118,23 +133,21 @@ def decode(frame: bytes, t: float, word: int | None = MATCHING_WORD) -> Report:
     """
     if len(frame) != SIZE:
         raise BadFrameError(f"has {len(frame)} bytes, not {SIZE}")
-    row = np.frombuffer(frame, FRAME)[0]
-    if row["size"] != SIZE:
-        raise BadFrameError(f"says that it has {row['size']} bytes, not {SIZE}")
-    if word is not None and row["word"] != word:
-        raise BadFrameError(f"ends in {row['word']:#010x}, not in the matching word {word:#010x}")
-    joints = row["joints"][:6].astype(float)
-    if not (np.abs(joints) <= _LARGEST_ANGLE).all():
-        raise BadFrameError(f"holds what is no joint angle: {joints.tolist()}")
-    state, mode = int(row["state"]), int(row["mode"])
+    size, timestamp, *rest = _READ.unpack(frame)
+    joints, (state, servo, motors, mode, collision, estop, last) = rest[:6], rest[8:]
+    if size != SIZE:
+        raise BadFrameError(f"says that it has {size} bytes, not {SIZE}")
+    if word is not None and last != word:
+        raise BadFrameError(f"ends in {last:#010x}, not in the matching word {word:#010x}")
+    if not all(abs(angle) <= _LARGEST_ANGLE for angle in joints):
+        raise BadFrameError(f"holds what is no joint angle: {joints}")
     if not (0 <= state <= 5 and 0 <= mode <= 2):
         raise BadFrameError(f"holds an unknown state or mode: {state}, {mode}")
-    flags = {flag: int(row[flag]) for flag in _FLAGS}
-    for flag, value in flags.items():
+    flags = (servo, motors, collision, estop)
+    for flag, value in zip(_FLAGS, flags, strict=True):
         if value not in (0, 1):
             raise BadFrameError(f"holds what is neither yes nor no: {flag} {value}")
-    known = {flag: bool(value) for flag, value in flags.items()}
-    return Report(t, int(row["timestamp"]), joints, state, mode, **known)
+    return MonitorReport(t, timestamp, np.array(joints), state, mode, *map(bool, flags))
 
 
 class FrameBuffer:
@@ -162,7 +175,7 @@ class FrameBuffer:
         self.lost = False
         self.fault = ""
 
-    def feed(self, received: bytes, t: float) -> list[Report]:
+    def feed(self, received: bytes, t: float) -> list[MonitorReport]:
         """Take in bytes; return what their whole frames say, oldest first.
 
         Parameters

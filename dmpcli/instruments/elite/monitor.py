@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments import sockets
-from dmpcli.instruments.elite.frames import MATCHING_WORD, SIZE, FrameBuffer, Report
+from dmpcli.instruments.elite.frames import MATCHING_WORD, SIZE, FrameBuffer, MonitorReport
 from dmpcli.instruments.protocols import Clock
 
 # What a frame tells of between one and the next, s, where it cannot be told from the first frames.
@@ -44,12 +44,12 @@ class Delay:
         self._interval = 0.0
         self._least, self._t, self._stamp = math.inf, 0.0, -math.inf
 
-    def undone(self, report: Report) -> float:
+    def undone(self, report: MonitorReport) -> float:
         """Return when a frame would have arrived without its delay, s.
 
         Parameters
         ----------
-        report : Report
+        report : MonitorReport
             Later than all before.
         """
         stamp = 1e-3 * report.timestamp
@@ -127,9 +127,9 @@ class Monitor:
         self._closing = False
         self._gone = ""
         self._news = threading.Condition()
-        self._newest: Report | None = None
+        self._newest: MonitorReport | None = None
         self._arrived = 0.0  # when the newest one did, by our clock
-        self._latched: Report | None = None
+        self._latched: MonitorReport | None = None
         self._delay = Delay()
 
     def open(self) -> None:
@@ -151,7 +151,7 @@ class Monitor:
             self.close()
             raise
 
-    def newest(self, after: float | None = None, patience: float | None = None) -> Report:
+    def newest(self, after: float | None = None, patience: float | None = None) -> MonitorReport:
         """Return the newest report.
 
         Parameters
@@ -194,7 +194,7 @@ class Monitor:
         return report
 
     @property
-    def latched(self) -> Report | None:
+    def latched(self) -> MonitorReport | None:
         """The first report of an emergency stop, a collision or an alarm, since it was opened.
 
         It stays, whatever later frames say: nobody may go on as if it had not been.
@@ -237,7 +237,7 @@ class Monitor:
             self._gone = gone
             self._news.notify_all()
 
-    def _take(self, report: Report) -> None:
+    def _take(self, report: MonitorReport) -> None:
         with self._news:
             if self._latched is None and report.alarming:
                 self._latched = report

@@ -13,7 +13,7 @@ _DEEPEST = 20.0
 
 
 @dataclass(frozen=True)
-class Workpiece:
+class SpringWorkpiece:
     """A workpiece whose surface pushes back like a spring; a `dmpcli.simulation.mock.Solid`.
 
     Attributes
@@ -45,7 +45,7 @@ class Workpiece:
         return (-1.0 if beside or depth > _DEEPEST else depth), normal
 
 
-def facing(surface: Surface, position: Floats, tool_axis: Floats) -> Workpiece:
+def facing(surface: Surface, position: Floats, tool_axis: Floats) -> SpringWorkpiece:
     """Return a part whose normals are on the side of a tool.
 
     Parameters
@@ -55,4 +55,4 @@ def facing(surface: Surface, position: Floats, tool_axis: Floats) -> Workpiece:
         Where the tool is, mm, and its axis into the work.
     """
     normal = surface.closest(position[None]).normal
-    return Workpiece(surface, sign=float(towards(normal, -tool_axis)[0, 0]))
+    return SpringWorkpiece(surface, sign=float(towards(normal, -tool_axis)[0, 0]))

@@ -51,19 +51,19 @@ def load() -> None:
     ).facets
     v, one, number, mark = np.empty((0, 3)), np.empty((0, 1)), np.empty(0, np.int64), none[:0, 0]
     walks = stepping.Walks(v, v, v, v, one, one, number, v, one[:, 0])
-    limits = stepping.Limits(0.9, -0.5, 0.3, 0.05, 0.01)
+    limits = stepping.WalkLimits(0.9, -0.5, 0.3, 0.05, 0.01)
     stepping.start(facets, limits, walks, walks, mark)
     stepping.ends(facets, limits, walks, number, mark, mark, mark)
     line = np.empty((0, 1, 3))
-    nodes = stepping.Nodes(line, line, line, one, none[:0, :1], none[:0, :1])
+    nodes = stepping.NodeArrays(line, line, line, one, none[:0, :1], none[:0, :1])
     stepping.lines(facets, limits, walks, number, number, 0, 1, nodes, mark)
     cell = np.empty((0, 2, 2))
     strip = samples.Strip(np.empty((0, 2, 2, 12)), np.empty((0, 2, 2, 3)), cell, cell)
     flat, flags = np.empty((0, 1)), none[:0, :1]
-    feet = samples.Feet(
+    feet = samples.SampleFeet(
         line, line, line, flat.astype(np.int64), flat, flags, flags, flags, flags, line, line
     )
-    where = samples.Limits(0.01, 0.05)
+    where = samples.SampleLimits(0.01, 0.05)
     samples.lift(facets, strip, flat, flat, one, number, where, feet)
     facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)
     frame = np.tile(np.eye(3), (1, 3, 1, 1))

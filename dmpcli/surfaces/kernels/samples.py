@@ -191,14 +191,14 @@ class Strip(NamedTuple):
     away: Floats
 
 
-class Limits(NamedTuple):
+class SampleLimits(NamedTuple):
     """What `triangle_mesh` and `geodesic_stepping` call by these names."""
 
     on_border: float
     landing: float
 
 
-class Feet(NamedTuple):
+class SampleFeet(NamedTuple):
     """Samples of B strokes on the mesh, as `strip_chart.Samples` says it, and what they met.
 
     Where there is `doubt` numpy is to decide, on `point` and `way`, e_v unnormalised.
@@ -262,8 +262,8 @@ def lift(
     v: Floats,
     sign: Floats,
     part: Integers,
-    limits: Limits,
-    out: Feet,
+    limits: SampleLimits,
+    out: SampleFeet,
 ) -> None:
     """Carry samples u, v (B, T), counted in nodes, through patches onto the mesh; fill `out`."""
     nodes, offs = stack()

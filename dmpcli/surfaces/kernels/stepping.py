@@ -30,7 +30,7 @@ from dmpcli.surfaces.kernels.vectors import (
 )
 
 
-class Limits(NamedTuple):
+class WalkLimits(NamedTuple):
     """What `geodesic_stepping` and `triangle_mesh` call by these names."""
 
     sharp: float
@@ -54,7 +54,7 @@ class Walks(NamedTuple):
     away: Floats
 
 
-class Nodes(NamedTuple):
+class NodeArrays(NamedTuple):
     """Nodes of M walks, shapes (M, count, 3) and (M, count)."""
 
     position: Floats
@@ -68,7 +68,7 @@ class Nodes(NamedTuple):
 @kernel
 def _probe(
     facets: Facets,
-    limits: Limits,
+    limits: WalkLimits,
     p: Vector,
     normal: Vector,
     sign: float,
@@ -85,7 +85,7 @@ def _probe(
 
 
 @kernel
-def start(facets: Facets, limits: Limits, ahead: Walks, behind: Walks, doubt: Booleans) -> None:
+def start(facets: Facets, limits: WalkLimits, ahead: Walks, behind: Walks, doubt: Booleans) -> None:
     """Find curvature ahead and behind of walks that stand at points of the mesh.
 
     `before` and `trend` of both ways are filled in; position, direction, normal, step, sign and
@@ -140,7 +140,7 @@ def _corrected(
 @kernel
 def _step(
     facets: Facets,
-    limits: Limits,
+    limits: WalkLimits,
     x: Vector,
     t: Vector,
     n: Vector,
@@ -189,7 +189,7 @@ def _step(
 @kernel
 def ends(
     facets: Facets,
-    limits: Limits,
+    limits: WalkLimits,
     walks: Walks,
     steps: Integers,
     sharp: Booleans,
@@ -225,13 +225,13 @@ def ends(
 @kernel
 def lines(
     facets: Facets,
-    limits: Limits,
+    limits: WalkLimits,
     walks: Walks,
     rows: Integers,
     counts: Integers,
     first: int,
     way: int,
-    out: Nodes,
+    out: NodeArrays,
     doubt: Booleans,
 ) -> None:
     """Walk `counts` nodes of each walk, and put them beside node `first` of its row of `out`.

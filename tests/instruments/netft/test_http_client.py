@@ -23,6 +23,7 @@ def server(answer):
     def serve():
         with contextlib.suppress(OSError):
             client, _ = listener.accept()
+            listener.close()  # who asks for another page is refused, and does not wait
             with client:
                 client.recv(65536)
                 for piece, pause in answer:

@@ -1,0 +1,97 @@
+"""A wall or an edge that ended a stroke, and what no loop of its delay could have spared the tool.
+
+A loop runs into a wall until it has felt it and the arm stands: meanwhile the force rises by the
+wall's stiffness for each millimetre that the plan goes on. How fast it rises is seen between
+readings that both feel the wall, those too that come after the stroke was ended. The first of them
+is none of these: before it lies a blow, by the inertia and the damping of an arm that moves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+# Of the largest force across the normal: what is less has not felt the wall.
+_LOADED = 0.25
+
+
+@dataclass(frozen=True)
+class MetWall:
+    """What was met across the normal, beside what could not be avoided.
+
+    Attributes
+    ----------
+    across : float
+        Force across the normal at which the stroke was ended, N.
+    largest : float
+        The most of it until the arm stood, N.
+    speed : float
+        Of the stroke against the wall, mm/s.
+    stiffness : float
+        Of tool and wall across the normal, by how fast the force rose, N/mm.
+    reaction : float
+        From a displacement to what is done about its force, s.
+    """
+
+    across: float
+    largest: float
+    speed: float
+    stiffness: float
+    reaction: float
+
+    @property
+    def unavoidable(self) -> float:
+        """Force that is met before anything can be done: reaction time by speed by stiffness, N."""
+        return self.reaction * self.speed * self.stiffness
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        return (
+            f"{self.largest:.1f} N across the normal until the arm stood; {self.unavoidable:.1f} N "
+            f"are unavoidable at {self.speed:.3g} mm/s on {self.stiffness:.3g} N/mm behind "
+            f"{self.reaction:.2g} s"
+        )
+
+
+def met(
+    across: float,
+    felt: Sequence[tuple[float, float]],
+    speed: float,
+    reaction: float,
+    period: float,
+) -> MetWall | None:
+    """Put together what was met; None where no rise of the force is seen, or nothing moved.
+
+    Where one reading alone has felt the wall, nothing tells the blow from the rise; then that force
+    is taken to have risen for a period.
+
+    Parameters
+    ----------
+    across : float
+        Force across the normal at which the stroke was ended, N.
+    felt : sequence of tuple of float
+        Time, s, and force across the normal, N, of each reading from before that to the arm's rest.
+    speed : float
+        Of the stroke against the wall, mm/s.
+    reaction : float
+        s.
+    period : float
+        Of the loop, s.
+    """
+    if not (felt and speed > 0.0):
+        return None
+    hardest = max(force for _, force in felt)
+    loaded = [force >= _LOADED * hardest for _, force in felt]
+    first = felt[loaded.index(True)][1]
+    rise = max(
+        (
+            (b - a) / (t - since)
+            for ((since, a), (t, b)), both in zip(pairwise(felt), pairwise(loaded), strict=True)
+            if all(both) and t > since
+        ),
+        default=0.0,
+    )
+    rise = rise if rise > _LOADED * first / period else first / period
+    if not rise > 0.0:
+        return None
+    largest = max(across, hardest)
+    return MetWall(across, largest, speed, rise / speed, reaction)

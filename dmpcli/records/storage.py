@@ -1,0 +1,125 @@
+"""Where bytes lie: on this machine, or in an object store; the one home of what a name means.
+
+A file of this machine is a `pathlib.Path`, an object an `ObjectPath`, which answers to the same
+calls; what differs is how a file is written, see `dmpcli.records.draft`.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+from urllib.parse import unquote
+
+from dmpcli.errors import InputError
+from dmpcli.records.object_store import SCHEMES, ObjectPath
+
+Location = Path | ObjectPath
+
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://(.*)", re.DOTALL)
+_FLAT = re.compile(rf"(?:{'|'.join(SCHEMES)}|file):/(?!/)", re.IGNORECASE)
+_PASSWORD = re.compile(r"(?<=://)[^/\s@]*:[^\s@]*@")
+_IN_BUCKET = re.compile(r"((?:^|=)(?:s3|gs)://)(?=[^/\s]*[:@])\S*", re.IGNORECASE)
+
+_HINTS = {"s3a": "s3", "s3n": "s3", "gcs": "gs", "az": "abfs", "adl": "abfs", "wasb": "abfs"}
+
+
+class Stat(Protocol):
+    """What is known of a file: its size, and when it was written, ns."""
+
+    @property
+    def st_size(self) -> int:
+        """Bytes."""
+
+    @property
+    def st_mtime_ns(self) -> int:
+        """When it was written, ns since 1970."""
+
+
+Stats = Mapping[str, Stat]
+"""Of files, by their names."""
+
+
+def located(name: str | Location) -> Location:
+    """Return the place that a name means.
+
+    Parameters
+    ----------
+    name : str, Path or ObjectPath
+        A file or folder of this machine, ``file:///PATH``, or ``s3://BUCKET/KEY``,
+        ``gs://BUCKET/KEY``, ``abfs://CONTAINER@ACCOUNT.dfs.core.windows.net/KEY``.
+
+    Raises
+    ------
+    InputError
+        It is of another kind, holds credentials, or names nothing.
+    """
+    if isinstance(name, ObjectPath):
+        return name
+    text = str(name)
+    found = _URL.fullmatch(text)
+    if found is None:
+        if _FLAT.match(text):
+            raise InputError(
+                f"{text}: names a store, which fit, generalize, execute, report and inspect read "
+                "(with two slashes); elsewhere copy the file to this machine first"
+            )
+        return name if isinstance(name, Path) else Path(text)
+    scheme, rest = found[1].lower(), found[2]
+    if scheme == "file":
+        return _local(text, rest)
+    if scheme not in SCHEMES:
+        hint = f"{_HINTS[scheme]}:// is meant" if scheme in _HINTS else "it is no kind of storage"
+        raise InputError(
+            f"{hidden(text)}: {hint}; s3://, gs://, abfs:// and file:// are known, and files"
+        )
+    return _in_store(scheme, rest)
+
+
+def _local(text: str, rest: str) -> Path:
+    host, slash, path = rest.partition("/")
+    if host not in ("", "localhost") or not slash:
+        raise InputError(f"{text}: must be whole, from the root on, as in file:///data/pairs.csv")
+    return Path("/" + unquote(path))
+
+
+def _in_store(scheme: str, rest: str) -> ObjectPath:
+    bucket, _, key = rest.partition("/")
+    names = (":", "@") if scheme in ("s3", "gs") else (":",)
+    if any(sign in bucket for sign in names):
+        raise InputError(
+            f"{scheme}://...: a name must not hold credentials; set them in the environment "
+            "(docs/storage.md)"
+        )
+    if not bucket or any(sign.isspace() for sign in bucket):
+        raise InputError(f"{scheme}://{rest}: names no bucket, as in {scheme}://BUCKET/NAME")
+    root = ObjectPath(f"{scheme}://{bucket}")
+    key = key.rstrip("/")
+    return root / key if key else root
+
+
+def beside(folder: Location, name: str) -> Location:
+    """Return the place that a name means which stands in a file of this folder.
+
+    Raises
+    ------
+    InputError
+        As `located`.
+    """
+    if _URL.fullmatch(name):
+        return located(name)
+    if isinstance(folder, Path):
+        return folder / name
+    if name.startswith("/"):
+        return Path(name)
+    steps: list[str] = []
+    for step in (*folder.key.split("/"), *name.split("/")):
+        if step == "..":
+            steps = steps[:-1]
+        elif step not in ("", "."):
+            steps.append(step)
+    return ObjectPath(folder.root, "/".join(steps))
+
+
+def hidden(text: str) -> str:
+    """Return a word of the command line without what may be a password or a key."""
+    return _PASSWORD.sub("***@", _IN_BUCKET.sub(r"\1***", text))

@@ -1,0 +1,48 @@
+"""A wall: how hard it was met, and what no loop of that delay would have spared the tool."""
+
+import pytest
+
+from dmpcli.control.met_wall import met
+
+
+def rising(begin, slope, until, since=0.0, every=0.01, most=200):
+    """Readings of a force that rises by so many N/s from a time on, and rests from another."""
+    times = [since + every * n for n in range(most)]
+    return [(t, max(min(t, until) - begin, 0.0) * slope) for t in times]
+
+
+@pytest.mark.parametrize("begin", [0.1, 0.1004, 0.107, 0.1099])
+def test_the_unavoidable_force_does_not_depend_on_when_in_a_cycle_the_wall_is_met(begin):
+    """20 mm/s into 45 N/mm, known after 75 ms: 67.5 N, whatever the first readings show of it."""
+    felt = rising(begin, 20.0 * 45.0, begin + 0.06)
+    wall = met(2.5, felt, 20.0, 0.075, 0.02)
+    assert wall.stiffness == pytest.approx(45.0)
+    assert wall.unavoidable == pytest.approx(67.5)
+    assert wall.largest == pytest.approx(54.0)
+    assert "67.5 N are unavoidable at 20 mm/s on 45 N/mm behind 0.075 s" in str(wall)
+
+
+def test_the_largest_force_is_that_at_which_it_was_ended_where_nothing_more_was_felt():
+    wall = met(9.0, [(0.0, 1.0), (0.01, 4.0)], 10.0, 0.05, 0.02)
+    assert wall.largest == 9.0
+    assert wall.unavoidable == pytest.approx(0.05 * 300.0)
+
+
+def test_the_blow_at_the_first_touch_is_no_stiffness():
+    """As on the bench: 18 N at once by inertia and damping, then 800 N/s until the arm stands."""
+    felt = [(0.0, 1.0), (0.01, 18.5), (0.02, 26.5), (0.03, 3.3), (0.04, 4.1)]
+    assert met(22.5, felt, 21.0, 0.075, 0.02).unavoidable == pytest.approx(60.0)
+
+
+def test_one_reading_that_felt_the_wall_is_taken_to_have_risen_for_a_period():
+    felt = [(0.0, 0.1), (0.01, 0.0), (0.02, 20.3), (0.03, 0.3), (0.04, 0.7)]
+    assert met(10.2, felt, 21.0, 0.075, 0.02).unavoidable == pytest.approx(76.125)
+
+
+@pytest.mark.parametrize("felt", [[], [(0.0, 0.0), (0.01, 0.0)]])
+def test_where_nothing_was_felt_nothing_is_said(felt):
+    assert met(4.0, felt, 10.0, 0.05, 0.02) is None
+
+
+def test_nor_of_a_tool_that_does_not_move():
+    assert met(4.0, rising(0.0, 100.0, 1.0), 0.0, 0.05, 0.02) is None
