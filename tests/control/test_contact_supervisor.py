@@ -503,3 +503,16 @@ def test_each_change_is_named_with_its_time_and_many_are_counted():
     some = [ContactEvent(0.1 * n, ("seeking", "drawing")[n % 2]) for n in range(14)]
     limits = ContactEvent(1.35, "drawing", "saturated: the correction has reached 10 mm/s")
     assert course([*some, limits]) == "7 × seeking, 7 × drawing"
+
+
+def test_after_a_touch_that_was_none_two_cycles_with_a_force_are_needed_again():
+    rig = Rig(Plant(2.0, surface=lambda t: None, noise=0.0))
+    while rig.supervisor.state != "seeking":
+        rig.cycle()
+    supervisor = rig.supervisor
+    states = []
+    for k, force in enumerate([0.6, 0.6, 0.26, 0.25, 0.6, 0.4, 0.6, 0.6]):
+        supervisor.step(rig.t + PERIOD * k, force, 0.0, 5.0)
+        states.append(supervisor.state)
+    # Half of the threshold of 0.5 N is no contact any more.
+    assert states == ["seeking", "landing", "landing", *["seeking"] * 4, "landing"]
