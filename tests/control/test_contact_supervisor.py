@@ -516,3 +516,22 @@ def test_after_a_touch_that_was_none_two_cycles_with_a_force_are_needed_again():
         states.append(supervisor.state)
     # Half of the threshold of 0.5 N is no contact any more.
     assert states == ["seeking", "landing", "landing", *["seeking"] * 4, "landing"]
+
+
+def test_a_force_that_has_not_settled_after_a_minute_never_will():
+    for clock, fails in ((59.97, False), (59.99, True)):
+        rig = Rig(Plant(2.0, noise=0.0))
+        while rig.supervisor.state != "landing":
+            rig.cycle()
+        rig.supervisor._clock = clock
+        rig.cycle()
+        assert bool(rig.supervisor.failure) is fails
+        if fails:
+            assert rig.supervisor.failure == "the force does not settle at 5 N"
+            assert not rig.supervisor.urgent
+    slow = Rig(Plant(2.0, noise=0.0), told_delay=0.2)
+    while slow.supervisor.state != "landing":
+        slow.cycle()
+    slow.supervisor._clock = 60.0
+    slow.cycle()
+    assert slow.supervisor.failure.endswith(" behind a delay of 0.2 s")
