@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dmpcli.admittance.force_coupling import fast_filter
-from dmpcli.admittance.force_law import ForceGains
+from dmpcli.admittance.force_law import ForceGains, LawState
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.force_sensing import Sensing
@@ -351,12 +351,16 @@ def test_off_the_work_what_is_left_of_it_goes_with_the_way():
 
 def test_another_stroke_is_counted_by_itself_with_the_same_supervisor():
     press = pressing(override=2.5)
+    press.supervisor.law = LawState(3.0, 1.0, 0.5)
+    press.supervisor.state = "drawing"
     other = press.on(dataclasses.replace(plan(stroke(normal=UP)), id="next"))
     assert (other.supervisor, other.tally, other.sense) == (
         press.supervisor,
         press.tally,
         press.sense,
     )
+    # It begins on the plan, and looks for the surface anew.
+    assert (press.supervisor.law, press.supervisor.state) == (LawState(), "free")
     assert other.wanted(100.0) == 3.0  # the plan states no force of its own to override
     assert other.tally.share("next") == 1.0
     moved = plan(stroke(duration=12.0, normal=UP))

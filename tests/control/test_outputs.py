@@ -361,7 +361,7 @@ def test_outputs_that_a_robot_cannot_switch_are_refused_before_it_moves():
 @pytest.mark.parametrize("queues", [True, False])
 def test_set_points_that_are_owed_are_reached_a_period_after_one_another(queues):
     """An arm that queues takes one in every period, whatever comes late."""
-    loop, servo, made = bench(TWO, jumps={20: 0.05, 70: 0.07}, queues=queues)
+    loop, _, made = bench(TWO, jumps={20: 0.05, 70: 0.07}, queues=queues)
     reached, reach = {}, loop._outputs.reach
 
     def noted(plan, index, when):
