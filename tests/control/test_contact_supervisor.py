@@ -423,6 +423,11 @@ def test_gains_are_those_of_the_rule_for_what_was_measured_said_or_usual():
     bare = Rig(Plant(2.0), told_delay=0.04).supervisor
     bare._choose()
     assert bare.gains == rule(5.0, 0.04)
+    heavy = Rig(Plant(2.0), told_delay=0.04, tool_mass=9.0).supervisor
+    heavy._choose()
+    wanted = rule(5.0, 0.04, 0.0, 9e-3)
+    assert heavy.gains.damping == pytest.approx(wanted.damping)
+    assert heavy.gains.damping > 1.1 * bare.gains.damping
 
 
 def test_the_lifted_tool_may_read_its_zero_limit_and_no_more():
