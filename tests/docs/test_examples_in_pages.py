@@ -110,7 +110,7 @@ def _lay_out_parts(folder):
     pose = {"position": [300, 40, 3], "rotation": [0, 0, 0.5]}
     (folder / "poses" / "right.json").write_text(json.dumps(pose))
     (folder / "table.json").write_text(json.dumps({"point": [0, 0, 0], "normal": [0, 0, 1]}))
-    [table] = blocks(ROOT / "docs" / "batches.md", "csv")
+    [table] = blocks(ROOT / "docs" / "batches.md", "none")
     (folder / "parts.csv").write_text(table)
 
 
@@ -206,7 +206,7 @@ def test_python_that_runs_elsewhere_is_taken_from_the_page_there():
 def test_every_fence_is_run_or_shows_what_the_program_says():
     """Commands stand in fences of sh, and are run; in those of text, what the program says."""
     whole = "\n".join(texts())
-    known = ("sh", "python", "toml", "json", "csv", "text")
+    known = ("sh", "python", "toml", "json", "none", "text")
     for page in PAGES:
         for language, block in re.findall(r"^```(\S*)\n(.*?)^```", page.read_text(), re.S | re.M):
             if language == "{toctree}":
