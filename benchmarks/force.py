@@ -159,9 +159,9 @@ def more(results: list[dict[str, Any]]) -> list[str]:
     said = []
     if of("after"):
         said.append(
-            f"without contact for {1e3 * max(of('gap')):.0f} ms, of which no loop answers within "
-            f"{1e3 * max(of('answers')):.0f}; in contact on {100 * min(of('after')):.2f} % from "
-            f"then to the end, {100 * min(of('whole')):.2f} % from the edge on, with at most "
+            f"without contact for {1e3 * max(of('gap')):.0f} ms (no loop answers within "
+            f"{1e3 * max(of('answers')):.0f}); in contact on {100 * min(of('after')):.2f} % from "
+            f"its answer to the end, {100 * min(of('whole')):.2f} % from the edge on, with at most "
             f"{max(of('peak_after')):.2f} N; on the edge {max(of('peak_edge')):.2f} N, along the "
             f"pen {max(of('along')):.1f} N"
         )
@@ -176,9 +176,10 @@ def more(results: list[dict[str, Any]]) -> list[str]:
     if of("unavoidable"):
         told = [one["wall"]["unavoidable"] for one in results if "wall" in one]
         ratio = max(one["across"] / one["unavoidable"] for one in results if "unavoidable" in one)
+        also = f" (told: {min(told):.0f} N)" if told else ""
         said.append(
-            f"across {max(of('across')):.0f} N, unavoidable {min(of('unavoidable')):.0f} N (told: "
-            f"{min(told, default=np.nan):.0f} N), ratio {ratio:.2f}"
+            f"across {max(of('across')):.0f} N, unavoidable {min(of('unavoidable')):.0f} N{also}, "
+            f"ratio {ratio:.2f}"
         )
     return said
 

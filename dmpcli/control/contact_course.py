@@ -17,6 +17,8 @@ from dmpcli.control.landing import Landing
 _STEP = 1.0
 # s that a resting force is waited for, beside the delay.
 REST = 0.1
+# So many standard deviations of its noise a force is no noise.
+SURE = 3.0
 
 
 class ContactCourse:
@@ -49,6 +51,8 @@ class ContactCourse:
         In this cycle the correction met its own limits.
     landing_peak : float
         Largest force of the landings, N.
+    noise : float
+        Standard deviation of a cycle's force while the tool was lifted and still, N.
     across : float or None
         Force across the normal that ended the run, if a wall did, N.
     """
@@ -69,7 +73,7 @@ class ContactCourse:
         self.delay: float | None = policy.whole_delay
         self.failure, self.urgent = "", False
         self.doubted = self.saturated = False
-        self.landing_peak = 0.0
+        self.landing_peak = self.noise = 0.0
         self.across: float | None = None
         self._softened = False
         self.begin()
@@ -93,7 +97,7 @@ class ContactCourse:
         if airborne:
             self._lifts = [self.law.e]
         self._before: float | None = None
-        self._sum = self._number = 0.0
+        self._sum = self._squares = self._number = 0.0
         self._felt: list[tuple[float, float]] = []
         self._landing: Landing | None = None
         self._lost_at = 0.0

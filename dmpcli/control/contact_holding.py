@@ -11,6 +11,8 @@ from dmpcli.control.contact_course import ContactCourse
 NEAR, NEAR_TIME = 0.1, 0.1
 # In a landing the force may be so many times the limit of a stroke: it is met at first sight.
 _LANDING = 1.5
+# An error of more than this share of the set-point is not summed up.
+_STEPS = 0.5
 # Until a landing has come near to its set-point its gains are softened so much.
 _GENTLE = 1.5
 # Where a surface that was lost is met again the force may rise over the set-point by this share of
@@ -20,6 +22,8 @@ _MORE, _CYCLES, _FASTEST = 0.5, 2.0, 20.0
 _USUAL = 5.0
 # Of an oscillation: alternations within so many delays, of a share of the set-point, or N.
 _SWINGS, _WITHIN, _SWING_SHARE, _SWING = 6, 20.0, 0.3, 0.5
+# The same in standard deviations of the noise, where that is more.
+_SWING_NOISE = 8.0
 # What a friction that is known may be off by, and a tilt may add.
 _RUBS = 0.2
 # Saturation is told once it has lasted so long, s.
@@ -76,6 +80,9 @@ class HeldForce(ContactCourse):
             # The last part of a landing is not to overshoot: slower, and with nothing summed up.
             gains = replace(gains.softened(_GENTLE), integral=math.inf)
         made = advance(gains, before, force - wanted, policy.rate)
+        if abs(force - wanted) > _STEPS * wanted:
+            # What has stepped, or was just met, is no slope that the integral has to follow.
+            made = replace(made, integral=before.integral)
         k = self.stiffness or policy.stiffness or _USUAL
         surface = made.e + max(force, 0.0) / k
         if abs(surface) > policy.clamp and surface * made.speed > 0.0:
@@ -103,7 +110,7 @@ class HeldForce(ContactCourse):
     def _listen(self, t: float, error: float, wanted: float) -> None:
         """Soften the gains of a loop that swings, once; stop one that swings on."""
         if self._swings is None:
-            size = max(_SWING_SHARE * wanted, _SWING)
+            size = max(_SWING_SHARE * wanted, _SWING, _SWING_NOISE * self.noise)
             window = _WITHIN * (self._known_delay + self._period)
             self._swings = AlternationDetector(size, _SWINGS, window)
         if not (self._swings.feel(t, error) and self._swings.grows):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dmpcli.admittance.force_stability import is_safe, steadied
-from dmpcli.control.contact_course import REST
+from dmpcli.control.contact_course import REST, SURE
 from dmpcli.control.contact_holding import NEAR, NEAR_TIME, HeldForce
 from dmpcli.control.guarded_motion import sinking
 from dmpcli.control.landing import Landing
@@ -47,7 +47,8 @@ class SoughtSurface(HeldForce):
             else:
                 self._stage, free, T = "probe", policy.free, self._period
                 lag = 2.0 * self._lag + REST
-                self._landing = Landing(wanted, self._speed, free, lag, T, self._felt[1:])
+                touched = self._felt[1:]
+                self._landing = Landing(wanted, self._speed, free, lag, T, touched, self.noise)
                 self.law = sinking(self.law, self._speed, self._period)
             return
         lowest = max(self._lost_at - policy.again, -policy.clamp) if again else -policy.reach
@@ -133,7 +134,7 @@ class SoughtSurface(HeldForce):
 
     def _settle(self, t: float, force: float, wanted: float) -> None:
         self._hold_force(t, force, wanted)
-        near = abs(force - wanted) <= max(NEAR * wanted, _NOISE)
+        near = abs(force - wanted) <= max(NEAR * wanted, _NOISE, SURE * self.noise)
         self._near = self._near + self._period if near else 0.0
         if self._settled:
             if force >= 0.5 * wanted:

@@ -11,6 +11,7 @@ positive away from the surface. Scalars only: this runs once a cycle.
 """
 
 from dmpcli.admittance.force_law import LawState
+from dmpcli.control.contact_course import SURE
 from dmpcli.control.contact_search import SoughtSurface
 from dmpcli.control.contact_zero import LiftedTool
 from dmpcli.control.guarded_motion import towards
@@ -52,7 +53,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         if self.failure:
             return self.law.e
         # A set-point near or below it would count as no contact.
-        contact = self.policy.contact
+        contact = max(self.policy.contact, SURE * self.noise)
         self._least = min(contact, wanted / 2.0) if wanted > 0.0 else contact
         touches = self.state in ("drawing", "landing", "lost", "seeking")
         if touches and wanted > 0.0:
@@ -60,7 +61,7 @@ class ContactSupervisor(LiftedTool, SoughtSurface):
         if self.urgent:
             return self.law.e
         if self.state == "free":
-            self._lift(t, force)
+            self._lift(t, force, wanted)
         elif wanted <= 0.0:
             self._held(t)
         elif self.state == "seeking":

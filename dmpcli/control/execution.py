@@ -297,7 +297,7 @@ def policy_of(
     )
 
 
-def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float) -> Filter:
+def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float = 0.0) -> Filter:
     """Return the filter for all strokes of a run: their time constants differ in no case.
 
     Parameters
@@ -361,7 +361,7 @@ def pressed(pressing: ForceTracker) -> str:
         )
     if pressing.wall is not None:
         said += f"; ended by a wall: {pressing.wall}"
-    if found.get("zero_drift", 0.0) > DRIFTED:
+    if found.get("zero_drift", 0.0) > max(DRIFTED, 3.0 * pressing.supervisor.noise):
         said += (
             f"; the force's zero has moved by {found['zero_drift']:.2f} N since it was taken, and "
             "so has the force that was held: calibrate anew, or let the sensor warm up"
@@ -370,7 +370,8 @@ def pressed(pressing: ForceTracker) -> str:
         said += f"; at its limits on {100.0 * found['saturated']:.2g} % of the stroke"
     if "oscillating" in {event.state for event in pressing.supervisor.events}:
         said += "; the force swung, and the gains were softened"
-    return f"{said}; contact: {course(pressing.supervisor.events)}"
+    changes = course(pressing.supervisor.events)
+    return f"{said}; contact: {changes}" if changes else said
 
 
 def watch(settings: ExecuteSettings) -> StopLimits:

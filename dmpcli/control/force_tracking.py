@@ -13,11 +13,11 @@ from dmpcli.admittance.force_coupling import Filter
 from dmpcli.admittance.normal_estimation import Vector, dot
 from dmpcli.arrays import Floats
 from dmpcli.control import guards
-from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.contact_tally import ContactTally
+from dmpcli.control.coupled_plan import lifts, setpoints
 from dmpcli.control.force_sensing import Sensing
-from dmpcli.control.met_wall import MetWall, met
+from dmpcli.control.met_wall import MetWall, against, met
 from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
 from dmpcli.instruments.protocols import RobotState, Sample
 from dmpcli.planning.plan import Plan
@@ -83,9 +83,9 @@ class ForceTracker:
         self.drift: float | None = None
         self._delta = (0.0, 0.0)
         self._zero, self._zeros = np.zeros(3), 0
-        self._wanted = _setpoints(plan, supervisor.policy.setpoint, override)
+        self._wanted = setpoints(plan, supervisor.policy.setpoint, override)
         self._reach = float((plan.position[-1] - plan.position[plan.last]) @ plan.normal[-1])
-        self._lifts = _lead(plan, supervisor.policy)
+        self._lifts = lifts(plan, supervisor.policy)
         self._lift = supervisor.policy.reach
         supervisor.lifted(0.0)
         supervisor.begin(airborne=self._wanted[plan.lead] <= 0.0)
@@ -98,7 +98,7 @@ class ForceTracker:
     def follow(self, plan: Plan) -> None:
         """Go on with a plan that is the same up to here, and whose end has moved in its plane."""
         self._plan = plan
-        self._wanted = _setpoints(plan, self.supervisor.policy.setpoint, self._override)
+        self._wanted = setpoints(plan, self.supervisor.policy.setpoint, self._override)
 
     @property
     def e(self) -> float:
@@ -190,14 +190,9 @@ class ForceTracker:
         number = min(round(index), len(plan) - 1)
         normal = np.array(self.sense.normal(_vector(plan.normal_at(index))))
         zero = plan.rotation[number] @ self._zero
-        felt = [wrench[:3] - zero for _, wrench in readings]
-        sides = [force - float(normal @ force) * normal for force in felt]
-        sizes = [math.sqrt(side @ side) for side in sides]
-        hardest = int(np.argmax(sizes))
+        felt = [(t, wrench[:3] - zero) for t, wrench in readings]
         step = plan.position[number] - plan.position[max(number - 1, 0)]
-        speed = abs(float(step @ sides[hardest])) / (sizes[hardest] * plan.period)
-        times = [t for t, _ in readings]
-        series = list(zip(times, sizes, strict=True))
+        series, speed = against(felt, normal, step / plan.period)
         reaction = supervisor.reaction + between
         self.wall = met(supervisor.across, series, speed, reaction, plan.period)
         if self.wall is not None:
@@ -337,35 +332,6 @@ def _vector(array: Floats) -> Vector:
     """The first three numbers of an array."""
     x, y, z = array[:3].tolist()
     return x, y, z
-
-
-def _setpoints(plan: Plan, setpoint: float, override: float | None) -> Floats:
-    """F_d at each set-point of a plan, shape (n,), N; an override leaves lifted parts at 0."""
-    wanted = np.zeros(len(plan))
-    drawn = slice(plan.lead, plan.last + 1)
-    if plan.force is None:
-        wanted[drawn] = setpoint
-    else:
-        own = plan.force[drawn]
-        wanted[drawn] = own if override is None else np.where(own > 0.0, override, 0.0)
-    return wanted
-
-
-def _lead(plan: Plan, policy: ContactPolicy) -> Floats:
-    """Share of the lift at each set-point before the stroke: it grows along the last way to it.
-
-    A way that is too short to be lifted on stays as it is; the tool is lifted where it ends.
-    """
-    shares = np.zeros(plan.lead)
-    first = [at for phase, at in plan.legs if phase == "approach" and at < plan.lead]
-    if not first:
-        return shares
-    count = plan.lead - first[-1]
-    if 1.875 * policy.reach > policy.free * 2.0 * count * plan.period:
-        return shares
-    s = np.arange(1, count + 1) / count
-    shares[first[-1] :] = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    return shares
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,16 @@ _PRESSES = 0.8
 # N by which the force must have risen on the way in, or that share of a set-point below 1 N: of
 # less the noise of a reading makes any slope.
 _RISE = 0.35
+# The same in standard deviations of the noise, where that is more.
+_SURE_RISE = 7.0
 # A surface so soft that it is none, N/mm.
 SOFTEST = 0.05
 # The way from one resting point to the other is no longer, mm.
 _LONGEST = 20.0
 # s over which resting forces are averaged, beside the delay that is waited for.
-_MEAN = 0.12
+_MEAN, _LONGEST_MEAN = 0.12, 1.0
+# How well they are to be known beside the noise, as a share of the set-point.
+_KNOWN = 0.02
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,8 @@ class Landing:
         s.
     touched : list of tuple of float
         Depth, mm, and force, N, of the cycles in which it was felt already.
+    noise : float
+        Standard deviation of a cycle's force, N.
 
     Attributes
     ----------
@@ -75,9 +81,13 @@ class Landing:
         lag: float,
         period: float,
         touched: list[tuple[float, float]],
+        noise: float = 0.0,
     ) -> None:
         self._wanted, self._speed, self._pressing = wanted, speed, pressing
         self._lag, self._period = lag, period
+        mean = (noise / (_KNOWN * wanted)) ** 2 * period
+        self._mean = min(max(_MEAN, mean), _LONGEST_MEAN)
+        self._rise = max(_RISE * min(wanted, 1.0), min(_SURE_RISE * noise, 0.4 * wanted))
         self._ramp = list(touched)
         self._stage = "ramp"
         self._waited = self._sum = 0.0
@@ -108,7 +118,7 @@ class Landing:
         self._waited += self._period
         if self._waited > self._lag:
             self._sum, self._number = self._sum + force, self._number + 1
-        if self._waited > self._lag + _MEAN:
+        if self._waited > self._lag + self._mean:
             self._rested.append((-state.e, self._sum / self._number))
             self._judge(state)
         return LawState(state.e)
@@ -117,14 +127,17 @@ class Landing:
         self._ramp.append((-state.e, force))
         depth, first = self._ramp[-1][0], self._ramp[0]
         pressed = depth - first[0]
-        if pressed > 2.0 and force - first[1] < SOFTEST * pressed:
+        if pressed > 2.0 and self._slope().slope < SOFTEST:
             self.failure = f"{force:.2f} N that do not rise over {pressed:.1f} mm of displacement"
-        risen = force - first[1] >= _RISE * min(self._wanted, 1.0)
+        risen = force - first[1] >= self._rise
         if force >= _STOPS * self._wanted and risen and len(self._ramp) >= 3:
-            self._fit = line([d for d, _ in self._ramp], [f for _, f in self._ramp])
+            self._fit = self._slope()
             self._rest()
             return LawState(state.e)
         return sinking(state, self._speed, self._period)
+
+    def _slope(self) -> Line:
+        return line([d for d, _ in self._ramp], [f for _, f in self._ramp])
 
     def _rest(self) -> None:
         self._stage, self._waited, self._sum, self._number = "rest", 0.0, 0.0, 0

@@ -6,9 +6,12 @@ readings that both feel the wall, those too that come after the stroke was ended
 is none of these: before it lies a blow, by the inertia and the damping of an arm that moves.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+from dmpcli.arrays import Floats
 
 # Of the largest force across the normal: what is less has not felt the wall.
 _LOADED = 0.25
@@ -50,6 +53,34 @@ class MetWall:
             f"are unavoidable at {self.speed:.3g} mm/s on {self.stiffness:.3g} N/mm behind "
             f"{self.reaction:.2g} s"
         )
+
+
+def against(
+    felt: Sequence[tuple[float, Floats]], normal: Floats, velocity: Floats
+) -> tuple[list[tuple[float, float]], float]:
+    """Return how hard a wall was met, and how fast the tool went against it.
+
+    Parameters
+    ----------
+    felt : sequence of tuple
+        Time, s, and force on the tool, shape (3,), N, of each reading.
+    normal : array, shape (3,)
+        Unit normal of the surface.
+    velocity : array, shape (3,)
+        Of the stroke, mm/s.
+
+    Returns
+    -------
+    list of tuple of float
+        Time, s, and size of the force across the normal, N.
+    float
+        Speed along the largest of these, mm/s.
+    """
+    sides = [force - float(normal @ force) * normal for _, force in felt]
+    sizes = [math.sqrt(side @ side) for side in sides]
+    largest = max(sizes)
+    speed = abs(float(velocity @ sides[sizes.index(largest)])) / largest if largest else 0.0
+    return list(zip((t for t, _ in felt), sizes, strict=True)), speed
 
 
 def met(

@@ -343,7 +343,7 @@ def pressed_like(**found):
         "share": 0.75,
         "saturated": 0.0,
     } | found
-    supervisor = SimpleNamespace(events=[])
+    supervisor = SimpleNamespace(events=[], noise=0.05)
     facts = {"contact": whole}
     return SimpleNamespace(facts=lambda: facts, supervisor=supervisor, wall=None)
 
@@ -352,7 +352,7 @@ def test_how_hard_it_pressed_is_said_in_one_line():
     assert execution.pressed(SimpleNamespace(facts=dict)) == "no stroke was drawn under force"
     assert execution.pressed(pressed_like()) == (
         "force along the normal 4.00 N in the mean, 1.00 to 6.00 N, RMS error 0.50 N; no contact "
-        "on 25 % of the stroke; contact: "
+        "on 25 % of the stroke"
     )
     more = pressed_like(landing_peak=5.5, stiffness=2.0, delay=0.06, saturated=0.125)
     more.wall = "9 N"
@@ -367,6 +367,9 @@ def test_how_hard_it_pressed_is_said_in_one_line():
         "the force swung, and the gains were softened",
         "contact: drawing at 0.50 s, oscillating at 1.25 s",
     ]
+    for drift, told in ((0.16, True), (0.14, False)):
+        said = execution.pressed(pressed_like(zero_drift=drift))
+        assert (f"zero has moved by {drift:.2f} N" in said) is told
     leans = pressed_like(
         normal_angle={"mean": np.radians(2.0), "p95": np.radians(3.5)}, friction=0.3
     )

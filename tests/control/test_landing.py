@@ -86,6 +86,17 @@ def test_an_offset_that_does_not_rise_between_two_rests_is_no_contact():
     assert flat.failure.startswith("2.00 N that do not rise over 2.0 mm")
 
 
+@pytest.mark.parametrize(("noise", "rise"), [(0.0, 0.35), (0.05, 0.35), (0.08, 0.56), (1.0, 2.0)])
+def test_the_way_in_goes_on_until_the_force_has_risen_beyond_its_noise(noise, rise):
+    """By 0.35 N or seven deviations, but by no more than 0.4 of the set-point."""
+    landing = Landing(5.0, SPEED, PRESSING, LAG, PERIOD, [(0.0, 3.0), (0.01, 3.0)], noise)
+    felt = 3.0
+    while not landing.resting:
+        felt += 0.02
+        landing.step(LawState(-felt), felt)
+    assert felt - 3.0 == pytest.approx(rise, abs=0.02 + 1e-9)
+
+
 def test_a_soft_contact_is_pressed_by_twenty_millimetres_at_the_most():
     _, depths, _ = landed(lambda depth: 0.06 * depth, wanted=9.0, cycles=9000)
     rest = next(i for i in range(2, len(depths)) if depths[i] == depths[i - 1])

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmpcli.dmp import tool_speed
 from dmpcli.dmp.tool_speed import Pace, held, passed
 
 RATE = 50.0
@@ -98,3 +99,16 @@ def test_what_is_held_is_the_share_of_the_path_at_the_speed():
         found, fastest = held(position, 50.0, speed)
         assert found == pytest.approx(share)
         assert fastest == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(("arrives", "samples"), [(1.0, 11), (1.02, 12), (0.98, 11)])
+def test_an_arrival_at_a_sample_is_the_last_one_and_else_the_next_rests(
+    monkeypatch, arrives, samples
+):
+    law = np.array([0.0, 0.4, arrives]), np.array([0.0, 30.0, 60.0])
+    monkeypatch.setattr(tool_speed, "_law", lambda *_: law)
+    path = np.column_stack([np.linspace(0.0, 60.0, 40), *np.zeros((2, 40))])
+    found = tool_speed.passed(np.linspace(0.0, 6.0, 40), path, Pace(60.0), 10.0)
+    assert len(found) == samples
+    assert found[[0, -1]].tolist() == [0.0, 6.0]
+    np.testing.assert_allclose(found[:4], [0.0, 0.75, 1.5, 2.25])

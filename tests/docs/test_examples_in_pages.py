@@ -26,6 +26,7 @@ from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.docs.pages import ELSEWHERE, PAGES, ROOT, blocks, lines, name_of
 from tests.docs.test_pages import texts
 from tests.faults import world
+from tests.object_store import BUCKET, empty, served
 from tests.records.meshes import box, written
 
 RUN = [page for page in PAGES if blocks(page, "sh")]
@@ -156,6 +157,13 @@ def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):
     typed = [line.replace(ROBOT, robot).replace(SENSOR, "netft://127.0.0.1") for line in typed]
     variables = {}
     with ExitStack() as stack:
+        if any("s3://" in line for line in typed):
+            store = stack.enter_context(served())
+            empty(store)
+            for name in ("demo.parquet", "pairs.csv"):
+                store.client().upload_file(name, BUCKET, name)
+            for name, value in store.environment.items():
+                monkeypatch.setenv(name, value)
         if any(robot in line for line in typed):
             stack.enter_context(cell().laid_out())
             for module in ("control.watchdog", "workflows.record"):

@@ -216,3 +216,15 @@ def test_what_cannot_be_mended_is_refused_by_place(fault, words):
             V[:, 1:] = 0.0
     with pytest.raises(InputError, match=words):
         mended(V, F)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.3, 1.0, 40.0])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_vertex_on_a_border_edge_is_stitched_whatever_the_size_of_the_mesh(size, turned):
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, -1, 0], [0.4, 0, 0], [0.2, 1, 0], [0.7, 1, 0]])
+    F = np.array([[0, 2, 1], [0, 3, 4], [3, 1, 5], [3, 5, 4]])
+    V = size * (-V[:, [1, 0, 2]] if turned else V)
+    found = mended(V, F)
+    assert len(found.F) == 5
+    assert any("1 T-junction stitched" in remark for remark in found.remarks)
+    assert len(found.V) == 6

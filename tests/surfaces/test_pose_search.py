@@ -59,3 +59,11 @@ def test_starts_anywhere_lay_one_point_on_another_in_orientations_all_around():
     assert np.abs(found.rotation.mean(axis=0)).max() < 0.02
     apart = np.linalg.norm(found.rotation[:, None] - found.rotation, axis=(2, 3))
     assert (apart + 9.0 * np.eye(500)).min() > 0.2
+
+
+def test_up_to_a_millionth_of_a_micrometre_a_point_lies_on_the_surface():
+    def closest(points):
+        return np.zeros_like(points), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+    _, gradient = pose_search.signed(np.array([[1e-9, 0, 0], [1.1e-9, 0, 0]]), closest)
+    assert gradient.tolist() == [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]

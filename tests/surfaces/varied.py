@@ -340,7 +340,8 @@ def guesses_beside_lines_and_grids():
         low, high = inverse_chart._swing(charts, position)
         at, near = inverse_chart._beside_centre_line(charts, position, low, high)
         found += [low, high, at, near]
-        for wide in (9.0, 60.0):
+        # The widest has more nodes than are looked at: it is coarser.
+        for wide in (9.0, 60.0, 4000.0)[: 3 if surface is DRUM else 2]:
             ends = [np.stack([x, side], axis=-1)[:, None] for x, side in (
                 (low, np.full(2, -wide)), (high, np.full(2, wide)))]  # fmt: skip
             found += inverse_chart._on_grid(charts, position, near, tuple(ends))
