@@ -43,6 +43,8 @@ AXES = 12
 
 _GREY, _AXIS, _START, _GOAL, _TIP = 0xC9CCD1, 0x6A6A6A, 0x009E73, 0xD40000, 0x000000
 _LEVEL = 6
+_PLACES = 6
+"""Of what colours stand for, in mm, mm/s and N: less is rounding."""
 
 
 def check() -> None:
@@ -74,8 +76,10 @@ class Quantity:
     def limits(self) -> tuple[float, float]:
         """Least and largest value; a little apart even where all are alike."""
         every = np.concatenate(self.values)
-        low, high = float(np.nanmin(every)), float(np.nanmax(every))
-        return low, high if high - low > 1e-9 * max(1.0, abs(high)) else low + 1.0
+        low, high = (
+            round(float(one), _PLACES) + 0.0 for one in (np.nanmin(every), np.nanmax(every))
+        )
+        return low, high if high > low else low + 1.0
 
 
 def page(
@@ -114,6 +118,7 @@ def page(
     plot.camera = _camera(chosen, size)
     for number, thing in enumerate(plot.objects, start=1):
         thing.id = number
+    names = [int(thing.id) for thing in plot.objects if thing.type == "Text"]
     title = ", ".join(short(stroke.label) for stroke in chosen[:4])
     title += ", …" if len(chosen) > 4 else ""
     on = f" on {ground.label}" if ground is not None else ""
@@ -134,6 +139,7 @@ def page(
         source=_packed_source(),
         data=_text(plot.get_binary_snapshot(_LEVEL)),
         quantities=json.dumps(words).replace("<", "\\u003c"),
+        names=json.dumps(names),
         last=f"{last:g}",
         gradient=", ".join(_gradient(k3d)),
     )
@@ -360,6 +366,7 @@ output { min-width: 4.5em; font-variant-numeric: tabular-nums; }
 <h1>$title</h1>
 <label>coloured by <select id="by"></select></label>
 <span class="scale"><span id="low"></span><i></i><span id="high"></span></span>
+<label><input type="checkbox" id="named"> names</label>
 <span class="key"><b style="background:#009e73"></b> start
 <b style="background:#d40000"></b> goal <b style="background:#000"></b> tool</span>
 <label id="when">time <input type="range" id="time" min="0" max="$last" step="any" value="0">
@@ -372,6 +379,7 @@ output { min-width: 4.5em; font-variant-numeric: tabular-nums; }
 <script>
 const unpack = text => Uint8Array.from(atob(text), sign => sign.charCodeAt(0));
 const quantities = $quantities;
+const names = $names;
 (0, eval)(fflate.strFromU8(fflate.unzlibSync(unpack('$source'))));
 const draw = async lib => {
   const place = document.getElementById('part');
@@ -399,6 +407,22 @@ const draw = async lib => {
     view.render();
   };
   by.addEventListener('change', choose);
+  const named = document.getElementById('named');
+  const name = async () => {
+    const world = view.getWorld();
+    for (const one of names) {
+      const json = world.ObjectsListJson[one];
+      if (json.visible !== named.checked) {
+        json.visible = named.checked;
+        await view.reload(json, { visible: json.visible }, false);
+      }
+    }
+    view.render();
+  };
+  named.addEventListener('change', name);
+  // On a phone many names would cover what they name.
+  named.checked = place.clientWidth > 600 || names.length < 4;
+  await name();
   const time = document.getElementById('time');
   time.addEventListener('input', async () => {
     document.getElementById('now').textContent = Number(time.value).toFixed(2) + ' s';

@@ -199,3 +199,12 @@ def test_without_the_extra_view_says_how_to_install_it(curved, monkeypatch, tmp_
     assert done.exit_code == 2
     assert "pip install 'dmpcli[view]'" in done.stderr
     assert not (tmp_path / "r").exists()
+
+
+def test_what_is_rounding_alone_is_no_end_of_a_scale():
+    from dmpcli.reporting.turnable import Quantity
+
+    off = Quantity("off the surface", "mm", [np.array([-1e-14, 3e-13]), np.array([np.nan])])
+    assert off.limits == (0.0, 1.0)
+    speed = Quantity("speed", "mm/s", [np.array([4.58e-13, 35.7])])
+    assert speed.limits == (0.0, 35.7)
