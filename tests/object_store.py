@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -29,7 +30,7 @@ class Fault:
     method, path : str
         Regular expressions of those that it befalls; the path with its query.
     status, code : str
-        Of the answer.
+        Of the answer; without a status the connection is cut.
     times : int
         How many it befalls before it is over.
     after : int
@@ -130,6 +131,9 @@ def served() -> Iterator[Store]:
             store.happened(method, path)
         if fault is None:
             return inner(environ, start)
+        if not fault.status:
+            environ["werkzeug.socket"].shutdown(socket.SHUT_RDWR)
+            return []
         environ["wsgi.input"].read(int(environ.get("CONTENT_LENGTH") or 0))
         text = "" if method == "HEAD" else ERROR.format(code=fault.code, message="a fault of ours")
         body = text.encode()

@@ -19,7 +19,7 @@ from dmpcli.errors import InputError
 from dmpcli.records import file_io, parquet, record, schemas
 from dmpcli.records.draft import Draft
 from dmpcli.records.record import Record
-from dmpcli.records.storage import Stats, located
+from dmpcli.records.storage import Stats, each, located
 
 _TEMPORARY = ".part-*.parquet.*.tmp"
 
@@ -96,13 +96,16 @@ class Folder:
             parts = {self.job.file_of(number): number for number in numbers}
             if not self._whole:
                 self._tidy(parts)
+            asked = [file for file in parts if file in self._there and file not in self._told]
+            found = each(self.path, lambda file: self._outcome(file, parts[file]), asked)
+            own = dict(zip(asked, found, strict=True))
             for file, number in parts.items():
                 self._stale.discard(file)
                 if file not in self._there:
                     continue
                 outcome = self._told.pop(file, None)
                 told = outcome is not None
-                outcome = outcome or self._outcome(file, number)
+                outcome = outcome or own.get(file)
                 if outcome is None or outcome.number != number or outcome.sites != hashes(number):
                     (self.path / file).unlink()
                     continue

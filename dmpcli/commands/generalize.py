@@ -34,7 +34,7 @@ def command(
             "-o",
             "--output",
             metavar="FILE|DIR",
-            help="Trajectory file (Parquet), or with --pairs a folder; or s3://, gs://, abfs://.",
+            help="Trajectory file (Parquet), or with --pairs a folder; or s3://BUCKET/NAME.",
             show_default=False,
         ),
     ],

@@ -19,7 +19,8 @@ def command(
         str | None,
         typer.Argument(
             metavar="FILE",
-            help="A file of ours, a mesh, or a CSV or Parquet from elsewhere; - is standard input.",
+            help="A file of ours, a mesh, or a CSV or Parquet from elsewhere, of s3:// too; - is "
+            "standard input.",
             show_default=False,
         ),
     ] = None,

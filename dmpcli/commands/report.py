@@ -20,8 +20,8 @@ def command(
         list[str],
         typer.Argument(
             metavar="FILE",
-            help="Demonstrations, trajectories, batch folders, runs and skills; - is standard "
-            "input. The first demonstration is what the others are compared with.",
+            help="Demonstrations, trajectories, batch folders, runs and skills, of s3:// too; - is "
+            "standard input. The first demonstration is what the others are compared with.",
             show_default=False,
         ),
     ],
@@ -47,7 +47,7 @@ def command(
             "-o",
             "--output",
             metavar="DIR",
-            help="Also write report.html, report.json, CSV and figures here.",
+            help="Also write report.html, report.json, CSV and figures here; or s3://BUCKET/NAME.",
         ),
     ] = None,
     view: Annotated[

@@ -1,7 +1,6 @@
 """A batch read part by part: its table of pairs, and the trajectories of one part at a time."""
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,15 +14,11 @@ from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
 from dmpcli.records.columns import check_ids, columns_of
 from dmpcli.records.file_io import Source
-from dmpcli.records.object_store import ObjectPath
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import DRAWN_ON, NORMAL, OK, Column, Schema
-from dmpcli.records.storage import Location
+from dmpcli.records.storage import Location, each
 from dmpcli.records.trajectory_reader import unit_normals
-
-_AT_ONCE = 16
-"""Parts of a batch in a store that are asked at once."""
 
 AGAIN = "the command that draws it goes on from the parts that are there"
 
@@ -144,12 +139,7 @@ def read(folder: Location) -> tuple[BatchFolder, list[str]]:
     source = file_io.read_table(folder)
     batch = _table(folder, source)
     odd = _compared(batch)
-    if isinstance(folder, ObjectPath):  # each takes its time to answer, and none waits for another
-        with ThreadPoolExecutor(_AT_ONCE) as asking:
-            list(asking.map(lambda file: _footer(batch, file), batch.files))
-    else:
-        for file in batch.files:
-            _footer(batch, file)
+    each(folder, lambda file: _footer(batch, file), batch.files)
     return batch, odd
 
 

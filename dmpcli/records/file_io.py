@@ -68,8 +68,9 @@ def read(path: str | Location, journal: bool = False) -> Source:
         source = Source(shown(path), _limited(shown(path), sys.stdin.buffer, journal))
     else:
         file = located(path)
-        if isinstance(file, ObjectPath) and file.is_file():
-            return _checked(_fetched(file), path, journal)
+        if isinstance(file, ObjectPath):
+            with contextlib.suppress(FileNotFoundError):
+                return _checked(_fetched(file), path, journal)
         if file.is_dir():
             raise InputError(f"{path}: is a directory, a file is needed here")
         try:

@@ -18,7 +18,7 @@ from dmpcli.records.columns import TYPES, columns_of, dtype_of
 from dmpcli.records.file_io import TABLE, Source, parts_of
 from dmpcli.records.json_files import loads
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, SCHEMAS, Schema
-from dmpcli.records.storage import Location
+from dmpcli.records.storage import Location, each
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 from dmpcli.version import __version__
@@ -458,17 +458,18 @@ def foreign_parts(folder: Location, known: Collection[str] = ()) -> list[str]:
     known : collection of str
         Names that are known to be ours.
     """
-    foreign = []
     names = sorted([*parts_of(folder), TABLE]) if folder.is_dir() else []
-    for name in names:
-        file = folder / name
-        if name in known or not file.is_file():
-            continue
-        try:
-            with file.open("rb") as stream:
-                ours = _may_be_ours(stream)
-        except OSError as error:
-            raise InputError(f"{file}: cannot be read: {error.strerror}") from None
-        if not ours:
-            foreign.append(name)
-    return foreign
+    asked = [name for name in names if name not in known]
+    ours = each(folder, lambda name: _is_ours_or_none(folder / name), asked)
+    return [name for name, one in zip(asked, ours, strict=True) if not one]
+
+
+def _is_ours_or_none(file: Location) -> bool:
+    """Tell whether a file may be ours; one that is not there counts as such."""
+    if not file.is_file():
+        return True
+    try:
+        with file.open("rb") as stream:
+            return _may_be_ours(stream)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None

@@ -5,15 +5,21 @@ calls; what differs is how a file is written, see `dmpcli.records.draft`.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 from urllib.parse import unquote
 
 from dmpcli.errors import InputError
 from dmpcli.records.object_store import SCHEMES, ObjectPath
 
 Location = Path | ObjectPath
+
+_AT_ONCE = 16
+"""Files that a store is asked for at once: each answer takes its time."""
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://(.*)", re.DOTALL)
 _FLAT = re.compile(rf"(?:{'|'.join(SCHEMES)}|file):/(?!/)", re.IGNORECASE)
@@ -118,6 +124,16 @@ def beside(folder: Location, name: str) -> Location:
         elif step not in ("", "."):
             steps.append(step)
     return ObjectPath(folder.root, "/".join(steps))
+
+
+def each(folder: Location, ask: Callable[[T], R], items: Iterable[T]) -> list[R]:
+    """Return what each of some files in a folder answers; a store is asked for many at once."""
+    if isinstance(folder, Path):
+        return [ask(item) for item in items]
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(_AT_ONCE) as asking:
+        return list(asking.map(ask, items))
 
 
 def hidden(text: str) -> str:

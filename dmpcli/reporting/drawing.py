@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from dmpcli.arrays import Floats
+from dmpcli.reporting import gaps
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.style import RC, STYLES, PlotStyle
 
@@ -144,10 +145,11 @@ def labels(axes: Axes, x: str = "", y: str = "") -> None:
         axes.yaxis.set_label_coords(-0.66 / width, 0.5)
 
 
-def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle) -> None:
-    """Draw one line in its role's style."""
-    axes.plot(
-        x, y, color=style.color, ls=style.line, lw=style.width, zorder=style.order,
+def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle, t: Floats | None = None) -> None:
+    """Draw one line in its role's style; one of samples at times `t` stops at gaps."""
+    apart = np.zeros(len(x) - 1, dtype=bool) if t is None else gaps.gaps(t)
+    gaps.line(
+        axes, x, y, apart, color=style.color, ls=style.line, lw=style.width, zorder=style.order,
         solid_capstyle="round",
     )  # fmt: skip
 

@@ -53,4 +53,5 @@ def line(axes: Axes, x: Floats, y: Floats, apart: Booleans, **style: Any) -> Non
     axes.plot(np.insert(x, at, np.nan), np.insert(y, at, np.nan), **style)
     if alone.any():
         dot = style.get("lw", 1.0) + 1.0
-        axes.plot(x[alone], y[alone], ls="", marker=".", ms=2.0 * dot, color=style.get("color"))
+        more = {key: style[key] for key in ("color", "zorder") if key in style}
+        axes.plot(x[alone], y[alone], ls="", marker=".", ms=2.0 * dot, **more)

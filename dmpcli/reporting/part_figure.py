@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from dmpcli.arrays import Booleans, Floats
-from dmpcli.reporting import drawing
+from dmpcli.reporting import drawing, gaps
 from dmpcli.reporting.drawing import PlottedCurve
 from dmpcli.reporting.raster import Camera, Picture, rendered
 from dmpcli.reporting.report_surface import ReportSurface
@@ -150,7 +150,7 @@ def _tilt(axes: Axes, placed: Sequence[PlacedCurve]) -> None:
 def _lines(axes: Axes, placed: Sequence[PlacedCurve], lines: Sequence[Floats]) -> None:
     for one, line, share in zip(placed, lines, drawing.shares(len(placed)), strict=True):
         way = _way(one.stroke)
-        drawing.draw(axes, way, line, one.curve.style)
+        drawing.draw(axes, way, line, one.curve.style, one.stroke.t)
         if len(placed) > 1:
             drawing.number(axes, way, line, one.curve, share)
 
@@ -231,11 +231,13 @@ def _scene(
         at = camera.seen(curve.position)
         hidden = picture.hides(camera, curve.position, by)
         any_hidden |= bool(hidden.any())
+        apart = gaps.gaps(curve.t)
         for rows in runs(hidden):
-            axes.plot(
-                at[rows, 0], at[rows, 1], color=curve.style.color, ls=curve.style.line,
-                lw=curve.style.width, alpha=_PALE if hidden[rows.start] else 1.0,
-                zorder=curve.style.order + 10, solid_capstyle="round",
+            gaps.line(
+                axes, at[rows, 0], at[rows, 1], apart[rows.start : rows.stop - 1],
+                color=curve.style.color, ls=curve.style.line, lw=curve.style.width,
+                alpha=_PALE if hidden[rows.start] else 1.0, zorder=curve.style.order + 10,
+                solid_capstyle="round",
             )  # fmt: skip
         drawing.number(axes, at[:, 0], at[:, 1], curve, share)
     shown: list[Floats] = []

@@ -98,7 +98,7 @@ def plane_figure(
     for curve, share in zip(curves, drawing.shares(len(curves)), strict=True):
         p, marks = seen(curve.position), seen(curve.marks)
         for axis, pane in ((1, top), (2, edge)):
-            drawing.draw(pane, p[:, 0], p[:, axis], curve.style)
+            drawing.draw(pane, p[:, 0], p[:, axis], curve.style, curve.t)
             drawing.number(pane, p[:, 0], p[:, axis], curve, share)
         drawing.mark(top, marks[:, 0], marks[:, 1], curve.style)
     for curve in curves[:1] if len(ends) == 1 else []:

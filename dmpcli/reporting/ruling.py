@@ -88,7 +88,12 @@ def _numbers(figure: Figure, axes: Axes, axis: Axis, at: Floats, level: bool) ->
     shifted = place + ScaledTranslation(
         0.0 if level else away, away if level else 0.0, figure.dpi_scale_trans
     )
-    for value, text in zip(at, axis.get_major_formatter().format_ticks(at.tolist()), strict=True):
+    formatter = axis.get_major_formatter()
+    texts = formatter.format_ticks(at.tolist())
+    if formatter.get_offset():
+        # A power of ten that matplotlib writes once, at the end of the axis; each number has it.
+        texts = [f"{value:g}" for value in at.tolist()]
+    for value, text in zip(at, texts, strict=True):
         axes.text(
             float(value) if level else 0.0, 0.0 if level else float(value), text,
             transform=shifted, ha="center" if level else "right",

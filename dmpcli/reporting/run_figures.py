@@ -14,6 +14,8 @@ _WIDTH, _PANEL = 5.9, 1.4
 _LEFT, _RIGHT, _GAP, _TOP, _BOTTOM = 0.95, 0.2, 0.62, 0.3, 0.55
 _FORCE, _ASIDE, _REST, _LINE = "#0072B2", "#D55E00", "#AAAAAA", "#444444"
 _LEAST_FORCE = 1.0
+_LEAST_LATE, _LEAST_OFF = 0.1, 0.01
+"""Least spans of their panels, ms and mm: what is rounding shall not fill them."""
 
 
 def force_figure(run: Record, row: dict[str, float] | None) -> Figure | None:
@@ -83,14 +85,20 @@ def deadline_figure(run: Record) -> Figure:
     foot = _BOTTOM + drawing.ROW
     figure = drawing.page(_LEFT + _WIDTH + _RIGHT, foot + 2 * _PANEL + _GAP + _TOP)
     panels = (
-        (foot + _PANEL + _GAP, late, "late / ms", "(a)  how much later than due it was sent"),
-        (foot, off, "off / mm", "(b)  distance of the arm from where it should have been"),
+        (
+            (foot + _PANEL + _GAP, late, _LEAST_LATE),
+            ("late / ms", "(a)  how much later than due it was sent"),
+        ),
+        (
+            (foot, off, _LEAST_OFF),
+            ("off / mm", "(b)  distance of the arm from where it should have been"),
+        ),
     )
-    for bottom, values, name, title in panels:
+    for (bottom, values, least), (name, title) in panels:
         axes = drawing.panel(figure, _LEFT, bottom, _WIDTH, _PANEL)
         _over_time(axes, deadline, values, drawn)
         axes.set_xlim(float(deadline[0]), float(deadline[-1]) or 1.0)
-        axes.set_ylim(0.0, 1.15 * float(np.nanmax(values, initial=0.0)) or 1.0)
+        axes.set_ylim(0.0, 1.15 * float(np.nanmax(values, initial=least)))
         drawing.labels(axes, y=name)
         drawing.title(axes, title)
         drawing.labels(axes, x="t / s")

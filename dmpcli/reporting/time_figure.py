@@ -74,7 +74,7 @@ def _row(axes: Axes, name: str, curves: Sequence[PlottedCurve]) -> None:
         else:
             values = curve.position[:, "XYZ".index(name)]
         t = curve.t - curve.shift
-        drawing.draw(axes, t, values, curve.style)
+        drawing.draw(axes, t, values, curve.style, t)
         drawing.number(axes, t, values, curve, share)
         shown.append(values)
     every = np.concatenate(shown)

@@ -36,6 +36,9 @@ _MORE = 0.04
 
 _TRIED = 3
 
+_AT_ONCE = 16
+"""Ways that are looked at whole at once, the best first."""
+
 _UPWARDS = 0.7
 """Cosine of the angle to base z up to which a facet is the upper side of a round patch."""
 
@@ -253,22 +256,43 @@ def _ways_about(
         np.cos(turns)[:, None] * first[:, None] + np.sin(turns)[:, None] * second[:, None]
     )  # (k, turns, 3)
     across = np.cross(normals[:, None], along)
+
+    def free(rows: Integers, ways: Integers, shape: Floats) -> Booleans:
+        u, v = shape[:, :1], shape[:, 1:]
+        points = u * along[rows, ways, None] + v * across[rows, ways, None]
+        held = whole.holds(number, points + feet[rows, None], size)[0]
+        return np.asarray(held.all(axis=-1))
+
     for stretch in _STRETCHES if stroke.length else _STRETCHES[:1]:
         path = stroke.path * [stretch, 1.0]
         centre = 0.5 * (path.min(axis=0) + path.max(axis=0))
-        u, v = np.concatenate([path - centre, (1.0 + _MORE) * (path - centre)]).T
-        points = u[:, None] * along[:, :, None] + v[:, None] * across[:, :, None]
-        points += feet[:, None, None]
-        good = whole.holds(number, points, size)[0].all(axis=-1)
-        rows, ways = np.nonzero(good)
+        shape = np.concatenate([path - centre, (1.0 + _MORE) * (path - centre)])
+        rows, ways = (index.ravel() for index in np.indices(along.shape[:2]))
+        away = np.linalg.norm(feet[rows] - middle, axis=1) / size
+        best = np.argsort(away + 0.2 * (1.0 - np.cos(turns[ways])), kind="stable")
+        rows, ways = rows[best], ways[best]
+
+        # Where its corners have no room, the rest need not be looked at.
+        open_ = free(rows, ways, shape[_corners(shape)])
+        rows, ways = rows[open_], ways[open_]
+        good = np.zeros(len(rows), dtype=bool)
+        for first_of in range(0, len(rows), _AT_ONCE):
+            some = slice(first_of, first_of + _AT_ONCE)
+            good[some] = free(rows[some], ways[some], shape)
+            if good.sum() >= _TRIED:
+                break
+        rows, ways = rows[good][:_TRIED], ways[good][:_TRIED]
         if len(rows) == 0:
             continue
-        away = np.linalg.norm(feet[rows] - middle, axis=1) / size
-        turned = 1.0 - np.cos(turns[ways])
-        best = np.argsort(away + 0.2 * turned, kind="stable")[:_TRIED]
-        rows, ways = rows[best], ways[best]
         start = feet[rows] - centre[0] * along[rows, ways] - centre[1] * across[rows, ways]
         goal = start + stretch * stroke.length * along[rows, ways]
         on = whole.mesh.closest(np.stack([start, goal])).position
         return [(on[0, i], on[1, i]) for i in range(len(rows))]
     return []
+
+
+def _corners(shape: Floats) -> Integers:
+    """Rows of points (k, 2) that reach farthest in eight directions."""
+    angles = np.arange(8) * np.pi / 4.0
+    far = shape @ np.stack([np.cos(angles), np.sin(angles)])
+    return np.unique(far.argmax(axis=0))

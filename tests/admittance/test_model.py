@@ -224,3 +224,16 @@ def test_a_step_with_bounds_is_the_free_one_shortened_first_in_acceleration_then
     np.testing.assert_allclose(made.velocity, v, atol=1e-9)
     np.testing.assert_allclose(made.position, pose.position + 0.02 * v[:3], atol=1e-9)
     np.testing.assert_allclose(made.rotation, exp(0.02 * v[3:]) @ pose.rotation, atol=1e-9)
+
+
+def test_a_law_has_as_many_axes_as_there_are_names():
+    with pytest.raises(ValueError, match="zip"):
+        check_stable(one(1.0, 1.0, 0.0, 0.02))
+    check_stable(one(1.0, 1.0, 0.0, 0.02), ("z",))
+    # At the border itself it swings for ever: 2TD + T²K = 4M.
+    with pytest.raises(InputError, match="unstable"):
+        check_stable(one(1.0, 4.0, 0.0, 0.5), ("z",))
+    check_stable(one(1.0, 3.9375, 0.0, 0.5), ("z",))
+    with pytest.raises(InputError, match="unstable"):
+        check_stable(one(1.0, 2.0, 8.0, 0.5), ("z",))
+    check_stable(one(1.0, 2.0, 7.9375, 0.5), ("z",))

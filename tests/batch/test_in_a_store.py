@@ -139,6 +139,7 @@ def test_throttled_and_failing_requests_cost_time_and_nothing_else(learned, whol
     store.faults += [
         Fault("PUT", "part-00001", times=2),
         Fault("PUT", "part-00003", "500 Oops", "InternalError", times=1),
+        Fault("PUT", "part-00004", status="", times=1),
         Fault("HEAD", "part-00002", times=1),
         Fault("GET", "list-type", times=1),
         Fault("PUT", "_manifest", times=1),

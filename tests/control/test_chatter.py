@@ -69,3 +69,30 @@ def test_on_a_stiff_plate_behind_a_lagging_servo_the_chatter_is_ended():
     last = columns["t"] > columns["t"][-1] - 2.5
     first = (columns["t"] > recorder.chatter.alarms[0]["t"] - 1.0) & ~last
     assert np.ptp(columns["fz"][last]) < 0.5 * np.ptp(columns["fz"][first])
+
+
+def test_a_tool_that_leans_by_just_60_degrees_from_an_axis_takes_part_in_it():
+    law = drag_settings().law
+    for along, parts in (
+        (0.5, [FACTOR, 1.0, FACTOR]),
+        (np.nextafter(0.5, 0.0), [1.0, 1.0, FACTOR]),
+    ):
+        made = damped(law, np.array([-along, 0.0, 0.9]))
+        np.testing.assert_allclose(made.damping[:3] / law.damping[:3], parts)
+        np.testing.assert_array_equal(made.stiffness, law.stiffness)
+        assert made.period == law.period
+
+
+def test_an_alarm_says_when_how_hard_and_what_it_has_made_of_the_preset():
+    detector = ChatterDetector(PERIOD)
+    detector.alarms = [
+        {"t": 1.25, "swing": 3.0, "factor": 1.6},
+        {"t": 2.84, "swing": 4.26, "factor": 1.6**2},
+    ]
+    assert detector.said().startswith(
+        "at 2.8 s the tool chatters on the work, by 4.3 N: its damping and inertia are 2.6 times "
+        "the preset's now"
+    )
+    assert not detector.spent
+    detector.alarms *= 3
+    assert detector.spent

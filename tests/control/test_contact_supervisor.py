@@ -359,9 +359,9 @@ def test_a_second_landing_on_what_is_known_is_quicker():
     assert rig.t - begun < 0.75 * first
 
 
-def at_work(**policy):
-    """A supervisor that draws at 5 N on 2 N/mm, told forces directly."""
-    rig = Rig(Plant(2.0, noise=0.0), **policy).land()
+def at_work(setpoint=5.0, **policy):
+    """A supervisor that draws on 2 N/mm, told forces directly."""
+    rig = Rig(Plant(2.0, noise=0.0), setpoint, **policy).land()
     assert rig.supervisor.state == "drawing"
     return rig.supervisor, rig.t
 
@@ -457,6 +457,11 @@ def test_gains_are_those_of_the_rule_for_what_was_measured_said_or_usual():
     bare = Rig(Plant(2.0), told_delay=0.04).supervisor
     bare._choose()
     assert bare.gains == rule(5.0, 0.04)
+    heavy = Rig(Plant(2.0), told_delay=0.04, tool_mass=9.0).supervisor
+    heavy._choose()
+    wanted = rule(5.0, 0.04, 0.0, 9e-3)
+    assert heavy.gains.damping == pytest.approx(wanted.damping)
+    assert heavy.gains.damping > 1.1 * bare.gains.damping
 
 
 def test_the_lifted_tool_may_read_its_zero_limit_and_no_more():
@@ -506,6 +511,28 @@ def test_after_a_stroke_it_is_lifted_by_the_reach_above_where_it_would_be_unpres
     assert [event.state for event in supervisor.events].count("retreating") == 1
 
 
+def swung(spacing, size=2.0, wanted=5.0):
+    """Forces that alternate by a size about the set-point: whether the loop is said to swing."""
+    supervisor, t = at_work(wanted, whole_delay=0.08, limit=9.0)
+    for k in range(1, 14):
+        supervisor.step(t + spacing * k, wanted + 0.5 * size * (-1) ** k, 0.0, wanted)
+    return "oscillating" in {event.state for event in supervisor.events}
+
+
+def test_six_alternations_within_twenty_delays_are_a_swing():
+    """Of a loop of 0.08 s and a period of 0.02 s: within 2 s."""
+    assert swung(0.39)
+    assert not swung(0.41)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "size", "swings"),
+    [(5.0, 1.52, True), (5.0, 1.48, False), (1.5, 0.52, True), (1.5, 0.48, False)],
+)
+def test_a_swing_is_three_tenths_of_the_set_point_or_half_a_newton(wanted, size, swings):
+    assert swung(0.2, size, wanted) is swings
+
+
 def test_each_change_is_named_with_its_time_and_many_are_counted():
     rig, _ = changing(2.0, lambda t: 0.0 if t < 2.0 else None)
     said = course(rig.supervisor.events)
@@ -515,3 +542,35 @@ def test_each_change_is_named_with_its_time_and_many_are_counted():
     some = [ContactEvent(0.1 * n, ("seeking", "drawing")[n % 2]) for n in range(14)]
     limits = ContactEvent(1.35, "drawing", "saturated: the correction has reached 10 mm/s")
     assert course([*some, limits]) == "7 × seeking, 7 × drawing"
+
+
+def test_after_a_touch_that_was_none_two_cycles_with_a_force_are_needed_again():
+    rig = Rig(Plant(2.0, surface=lambda t: None, noise=0.0))
+    while rig.supervisor.state != "seeking":
+        rig.cycle()
+    supervisor = rig.supervisor
+    states = []
+    for k, force in enumerate([0.6, 0.6, 0.26, 0.25, 0.6, 0.4, 0.6, 0.6]):
+        supervisor.step(rig.t + PERIOD * k, force, 0.0, 5.0)
+        states.append(supervisor.state)
+    # Half of the threshold of 0.5 N is no contact any more.
+    assert states == ["seeking", "landing", "landing", *["seeking"] * 4, "landing"]
+
+
+def test_a_force_that_has_not_settled_after_a_minute_never_will():
+    for clock, fails in ((59.97, False), (59.99, True)):
+        rig = Rig(Plant(2.0, noise=0.0))
+        while rig.supervisor.state != "landing":
+            rig.cycle()
+        rig.supervisor._clock = clock
+        rig.cycle()
+        assert bool(rig.supervisor.failure) is fails
+        if fails:
+            assert rig.supervisor.failure == "the force does not settle at 5 N"
+            assert not rig.supervisor.urgent
+    slow = Rig(Plant(2.0, noise=0.0), told_delay=0.2)
+    while slow.supervisor.state != "landing":
+        slow.cycle()
+    slow.supervisor._clock = 60.0
+    slow.cycle()
+    assert slow.supervisor.failure.endswith(" behind a delay of 0.2 s")

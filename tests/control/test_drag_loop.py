@@ -665,3 +665,14 @@ def test_where_others_may_move_the_arm_it_must_stand_still_when_it_is_taken():
         begun = servo.clock.now()
         recorder.run()
         assert (servo.sent[0][0] - begun > 0.25) is waits
+
+
+@pytest.mark.parametrize(("rate", "fits"), [(1000.0, True), (1000.5, False)])
+def test_a_sensor_may_be_asked_for_all_that_it_sends_and_no_more(rate, fits):
+    """A thousand samples a second."""
+    recorder, _, _ = bench(longest=0.1, sensor_rate=rate)
+    if fits:
+        assert recorder.run().reason == "duration"
+        return
+    with pytest.raises(InputError, match="the fake sensor sends at most 1000"):
+        recorder.run()

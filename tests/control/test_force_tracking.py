@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dmpcli.admittance.force_coupling import fast_filter
-from dmpcli.admittance.force_law import ForceGains
+from dmpcli.admittance.force_law import ForceGains, LawState
 from dmpcli.control.contact_policy import ContactPolicy
 from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.force_sensing import Sensing
@@ -351,12 +351,16 @@ def test_off_the_work_what_is_left_of_it_goes_with_the_way():
 
 def test_another_stroke_is_counted_by_itself_with_the_same_supervisor():
     press = pressing(override=2.5)
+    press.supervisor.law = LawState(3.0, 1.0, 0.5)
+    press.supervisor.state = "drawing"
     other = press.on(dataclasses.replace(plan(stroke(normal=UP)), id="next"))
     assert (other.supervisor, other.tally, other.sense) == (
         press.supervisor,
         press.tally,
         press.sense,
     )
+    # It begins on the plan, and looks for the surface anew.
+    assert (press.supervisor.law, press.supervisor.state) == (LawState(), "free")
     assert other.wanted(100.0) == 3.0  # the plan states no force of its own to override
     assert other.tally.share("next") == 1.0
     moved = plan(stroke(duration=12.0, normal=UP))
@@ -397,3 +401,61 @@ def test_more_than_the_tool_may_meet_stops_whatever_is_felt_with():
     with pytest.raises(RefusedError, match="force"):
         touch([sample(0.0, 4.0)]).feel(state(), 0.0, 3.9)
     assert touch([sample(0.0, 4.0)]).feel(state(), 0.0, 4.0)[2] == 4.0
+
+
+def test_a_wall_is_what_rises_across_the_normal_as_fast_as_the_stroke_runs_into_it():
+    press, made = pressing(), plan(stroke(normal=UP))
+    supervisor, along = press.supervisor, np.array([0.6, -0.8, 0.0])
+    press._zero = np.array([0.3, -0.2, 0.4])  # of the tool, which points down
+    own = made.rotation[120] @ press._zero
+    readings = [
+        (0.01 * n, np.append(own + 30.0 * n * along * (n < 5) + [0.0, 0.0, 4.0], np.zeros(3)))
+        for n in range(8)
+    ]
+    press.look_back(120.0, readings, 0.01)
+    assert press.wall is None  # nothing was met yet
+    supervisor.across = 2.5
+    press.look_back(120.0, [], 0.01)
+    assert press.wall is None
+    supervisor.failure = "met"
+    press.look_back(120.0, readings, 0.01)
+    speed = abs((made.position[120] - made.position[119]) @ along) / PERIOD
+    assert press.wall.speed == pytest.approx(speed)
+    assert press.wall.stiffness == pytest.approx(3000.0 / speed)
+    assert (press.wall.across, press.wall.largest) == (2.5, pytest.approx(120.0))
+    assert press.wall.reaction == pytest.approx(supervisor.reaction + 0.01)
+    assert supervisor.failure == f"met ({press.wall})"
+    before = press.wall
+    press.look_back(200.0, readings, 0.01)
+    assert press.wall is before
+
+
+def test_how_far_the_zero_has_moved_is_told_in_the_tools_axes_once_it_is_clear():
+    press = pressing()
+    press._zero = np.array([0.1, 0.2, 0.3])
+    R = from_euler(np.array([np.pi, 0.4, 1.0]))
+    readings = [
+        (t, np.append(R @ [0.1, 0.2, 0.3 + off], np.ones(3))) for t, off in ((0, 0.2), (1, 0.4))
+    ]
+    press.clear(readings, R)
+    assert press.drift is None  # it presses still
+    press.supervisor.leaves(1.0)
+    press.clear([], R)
+    assert press.drift is None
+    press.clear(readings, R)
+    assert press.drift == pytest.approx(0.3)
+
+
+def test_what_was_felt_reading_by_reading_is_told_from_some_cycles_ago_to_now():
+    felt = touch(
+        [sample(0.01 * k, float(k)) for k in range(4)], [sample(0.05, 5.0)], [sample(0.06, 6.0)]
+    )
+    felt.feel(state(), 0.03)
+    felt.feel(state(), 0.05)
+    told = felt.look_back(state(np.pi).rotation)
+    assert [t for t, _ in told] == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.05, 0.06])
+    assert [wrench[2] for _, wrench in told] == pytest.approx([0.0, -1.0, -2.0, -3.0, -5.0, -6.0])
+    # Of many the last six, and what has come since.
+    many = touch([sample(0.001 * k, float(k)) for k in range(9)])
+    many.feel(state(), 0.01)
+    assert [wrench[2] for _, wrench in many.look_back(state().rotation)] == [3.0, 4, 5, 6, 7, 8]

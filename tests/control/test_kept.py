@@ -33,6 +33,7 @@ from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import exp
 from tests.control.contact_plant import Plant, Rig
 from tests.control.drag_fakes import rehearse
+from tests.control.fake_sensors import StreamingSensor
 from tests.control.mock_runs import executed, short
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, stroke
 from tests.control.test_goal_following import Run as Followed
@@ -145,6 +146,26 @@ def runs_that_press():
         bench.sensor.plate = START[2] - below
         outcome = bench.run()
         found += [outcome.reason, seen(bench), bench.loop.pressing.gains]
+    return found
+
+
+@KEPT.case
+def walls_that_are_run_into():
+    found: list = []
+    for slope, drift in ((800.0, 0.0), (90.0, 0.02)):
+        bench = Bench(plan(stroke(3.0, normal=(0, 0, 1))), presses=True)
+        met: list = []
+
+        def feel(t, bench=bench, met=met, slope=slope, drift=drift):
+            side = slope * min(max(t - met[0], 0.0), 0.06) if met else 0.0
+            push = 2.0 * max(START[2] - bench.servo.position[2], 0.0) + drift * (t - 100.0)
+            return np.array([0.6 * side, 0.8 * side, push, 0.0, 0.0, 0.0])
+
+        bench.servo.at = {360: lambda _, b=bench, m=met: m.append(b.clock.now() + 0.005)}
+        streaming = StreamingSensor(bench.clock, feel)
+        streaming.start(100.0)
+        bench.sensor.poll = streaming.poll
+        found += [bench.run().reason, bench.loop.pressing.facts(), seen(bench)]
     return found
 
 

@@ -125,3 +125,16 @@ def test_a_used_normal_goes_round_a_curve_with_the_planned_one_and_keeps_its_lea
             assert np.arccos(used @ (R @ UP)) == pytest.approx(0.03, abs=1e-6)
     policy = NormalPolicy()
     assert (policy.used, policy.angle, policy.rate) == (False, 0.175, 0.175)
+
+
+def test_the_friction_that_was_found_is_what_the_next_stroke_begins_with():
+    sense = NormalSense(PERIOD, NormalPolicy())
+    for i in range(300):
+        force = 5.0 * np.array([0.0, 0.0, 1.0]) - [2.5 if i % 60 < 30 else -2.5, 0.0, 0.0]
+        x = 15.0 * PERIOD * (i % 60 if i % 60 < 30 else 60 - i % 60)
+        sense.feel(i * PERIOD, tuple(force), (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+    found = sense._estimator.friction
+    assert found > 0.3
+    sense.begin()
+    assert sense._estimator.friction == found
+    assert sense._estimator.heard == 0

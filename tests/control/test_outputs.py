@@ -356,3 +356,26 @@ def test_outputs_that_a_robot_cannot_switch_are_refused_before_it_moves():
         outputs.check(player, ["a"])
     strokes = [with_events(*TWO), with_events(OutputEvent(0.0, "x", on=True), *TWO)]
     assert outputs.names_of(strokes) == ["DO1", "x"]
+
+
+@pytest.mark.parametrize("queues", [True, False])
+def test_set_points_that_are_owed_are_reached_a_period_after_one_another(queues):
+    """An arm that queues takes one in every period, whatever comes late."""
+    loop, _, made = bench(TWO, jumps={20: 0.05, 70: 0.07}, queues=queues)
+    reached, reach = {}, loop._outputs.reach
+
+    def noted(plan, index, when):
+        reached.setdefault(index, when)
+        reach(plan, index, when)
+
+    loop._outputs.reach = noted
+    assert loop.run(Interruption()).reason == DONE
+    whens = np.array([reached[float(i)] for i in range(len(made))])
+    if queues:
+        late = np.zeros(len(made))
+    else:
+        # Two and three deadlines were missed, and those cycles came late themselves.
+        late = np.where(np.arange(len(made)) > 20, 0.04, 0.0)
+        late = np.where(np.arange(len(made)) > 68, 0.1, late)
+        late[20], late[68] = 0.05, 0.04 + 0.07
+    np.testing.assert_allclose(whens, 0.02 * np.arange(len(made)) + late, atol=1e-9)

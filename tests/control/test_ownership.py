@@ -104,3 +104,24 @@ def test_a_controller_in_motion_may_only_have_paused():
     made, clock = servo(busy=True)
     ownership.require_rest(made, clock)
     assert clock.now() - 100.0 == pytest.approx(ownership.BUSY_WINDOW, abs=0.02)
+
+
+def test_where_names_lie_in_the_file_system_a_lock_is_a_file_of_one_owner(monkeypatch):
+    monkeypatch.setattr(ownership.sys, "platform", "darwin")
+    path = f"/tmp/dmpcli-arm-127.0.0.1:{PORT}"
+    with contextlib.suppress(FileNotFoundError):
+        os.unlink(path)
+    url = f"elite://127.0.0.1:{PORT}"
+    try:
+        with lock(url):
+            assert os.stat(path).st_mode & 0o600 == 0o600
+            with pytest.raises(RefusedError, match="another dmpcli on this computer moves"):
+                lock(url).take()
+        with lock(url):
+            pass
+        os.unlink(path)
+        os.symlink("/tmp/elsewhere-of-no-lock", path)
+        with pytest.raises(InstrumentError, match="cannot be locked"):
+            lock(url).take()
+    finally:
+        os.unlink(path)

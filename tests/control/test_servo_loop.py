@@ -806,3 +806,19 @@ def test_the_first_failure_counts_and_an_arm_that_may_move_comes_last():
     assert str(both.error("", "; 1 of 2")) == f"first; 1 of 2\n{left}"
     alone = LoopOutcome(str(left), left.error(), stop=left)
     assert str(alone.error("", "; 1 of 2")) == f"1 of 2\n{left}"
+
+
+def test_a_coupled_stroke_is_counted_once_its_end_has_passed_the_look_ahead():
+    """0.2 s of it; from 0.1 s later on the arm must have come."""
+    loop = Bench(plan(stroke(2.0, normal=(0, 0, 1))), presses=True).loop
+    asked = []
+    loop._count = lambda over: asked.append(over)
+    for gone, wanted in ((0.16, []), (0.18, [False]), (0.26, [False]), (0.32, [True])):
+        asked.clear()
+        loop._over = gone
+        assert not loop._clear()
+        assert asked == wanted
+    # Led off by its plan, or brought to rest, it is clear.
+    loop.plan = dataclasses.replace(loop.plan, last=loop.plan.last - 1)
+    assert loop._clear()
+    assert asked == [True]

@@ -126,3 +126,10 @@ def test_a_part_that_lacks_a_stroke_or_a_batch_of_none_is_refused(folder):
     (folder / TABLE).write_bytes(record.encode(made))
     with pytest.raises(InputError, match="no pair has a trajectory; the first, a: too long"):
         stroke_file.find(str(folder))
+
+
+def test_a_file_of_another_kind_is_refused():
+    columns = {"t": np.arange(3.0), **{name: np.zeros(3) for name in ("x", "y", "z")}}
+    made = Record(schemas.DEMONSTRATION, columns, Provenance("record", {}, (), {}))
+    with pytest.raises(InputError, match="demonstration"):
+        stroke_file.find(Source("d.parquet", record.encode(made)))

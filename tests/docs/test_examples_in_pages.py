@@ -26,6 +26,7 @@ from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.docs.pages import ELSEWHERE, PAGES, ROOT, blocks, lines, name_of
 from tests.docs.test_pages import texts
 from tests.faults import world
+from tests.object_store import BUCKET, empty, served
 from tests.records.meshes import box, written
 
 RUN = [page for page in PAGES if blocks(page, "sh")]
@@ -109,7 +110,7 @@ def _lay_out_parts(folder):
     pose = {"position": [300, 40, 3], "rotation": [0, 0, 0.5]}
     (folder / "poses" / "right.json").write_text(json.dumps(pose))
     (folder / "table.json").write_text(json.dumps({"point": [0, 0, 0], "normal": [0, 0, 1]}))
-    [table] = blocks(ROOT / "docs" / "batches.md", "csv")
+    [table] = blocks(ROOT / "docs" / "batches.md", "none")
     (folder / "parts.csv").write_text(table)
 
 
@@ -156,6 +157,13 @@ def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):
     typed = [line.replace(ROBOT, robot).replace(SENSOR, "netft://127.0.0.1") for line in typed]
     variables = {}
     with ExitStack() as stack:
+        if any("s3://" in line for line in typed):
+            store = stack.enter_context(served())
+            empty(store)
+            for name in ("demo.parquet", "pairs.csv"):
+                store.client().upload_file(name, BUCKET, name)
+            for name, value in store.environment.items():
+                monkeypatch.setenv(name, value)
         if any(robot in line for line in typed):
             stack.enter_context(cell().laid_out())
             for module in ("control.watchdog", "workflows.record"):
@@ -198,7 +206,7 @@ def test_python_that_runs_elsewhere_is_taken_from_the_page_there():
 def test_every_fence_is_run_or_shows_what_the_program_says():
     """Commands stand in fences of sh, and are run; in those of text, what the program says."""
     whole = "\n".join(texts())
-    known = ("sh", "python", "toml", "json", "csv", "text")
+    known = ("sh", "python", "toml", "json", "none", "text")
     for page in PAGES:
         for language, block in re.findall(r"^```(\S*)\n(.*?)^```", page.read_text(), re.S | re.M):
             if language == "{toctree}":

@@ -14,8 +14,12 @@ from dmpcli.records.record import Provenance, Record
 from dmpcli.reporting import drawing, pose_errors, run_figures
 from dmpcli.reporting.contact import contact_of
 from dmpcli.reporting.contact_figure import contact_figure
+from dmpcli.reporting.curve_names import named
 from dmpcli.reporting.gaps import gaps, line, usual_step
+from dmpcli.reporting.plane_figure import Beyond, plane_figure
+from dmpcli.reporting.strokes import strokes_of
 from dmpcli.reporting.summary import sentences
+from dmpcli.reporting.time_figure import time_figure
 from dmpcli.spatial.trajectory import Trajectory
 from tests.reporting.example_files import run, trajectory, wave
 
@@ -142,6 +146,33 @@ def test_a_set_point_that_was_never_sent_has_no_lateness():
     assert run_figures.deadline_figure(made).axes[0].get_ylim()[1] > 0.0
     never = replace(made, columns=dict(made.columns) | {"lateness": np.full(len(late), np.nan)})
     assert run_figures.deadline_figure(never) is not None
+
+
+def test_rounding_does_not_fill_the_panels_of_punctuality():
+    made, _ = felt()
+    late = np.where(np.arange(len(made.t)) % 50 == 0, 1.8e-15, 0.0)
+    figure = run_figures.deadline_figure(
+        replace(made, columns=dict(made.columns) | {"lateness": late})
+    )
+    assert figure.axes[0].get_ylim()[1] >= 0.1
+
+
+def test_a_stroke_is_not_drawn_over_what_its_run_lacks():
+    """In time, on its plane and from the side."""
+    made, rows = felt()
+    made = without(made, rows[100:200])
+    (stroke,) = strokes_of(made, "run")
+    curves = named([stroke])
+    for axes in time_figure(curves).axes:
+        assert np.diff(spans(axes), axis=1).max() < 0.05
+    beyond = Beyond(np.empty((0, 2, 3)), (), ())
+    for axes in plane_figure(curves, [(stroke.start, stroke.goal)], None, beyond).axes:
+        longest = max(
+            np.nanmax(np.hypot(np.diff(x), np.diff(y)))
+            for x, y in (one.get_data() for one in axes.lines)
+            if len(x) > 100
+        )
+        assert longest < 2.0
 
 
 def test_poses_that_have_no_like_are_not_joined():

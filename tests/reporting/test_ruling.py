@@ -45,6 +45,17 @@ def test_a_colour_bar_keeps_its_numbers_on_its_own_side():
     assert figure.axes[1].yaxis.get_visible()
 
 
+def test_a_power_of_ten_is_in_the_numbers_where_matplotlib_writes_it_aside():
+    figure = drawing.page(4.0, 3.0)
+    axes = drawing.panel(figure, 0.8, 0.6, 2.4, 2.0)
+    axes.plot([0.0, 1.0], [0.0, 1.8e-12])
+    with drawing.settings(text=True):
+        ruling.rule(figure)
+        ruled, _ = texts(figure)
+    assert "1.5e-12" in ruled
+    assert "1.5" not in ruled
+
+
 def test_a_hidden_row_of_numbers_stays_hidden():
     with drawing.settings(text=True):
         figure = panel()
