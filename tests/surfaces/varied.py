@@ -282,7 +282,7 @@ def splines_between_nodes():
     rng = np.random.default_rng(7)
     found: list = []
     for shape in ((1, 5, 2), (3, 6, 4)):
-        spline = strip_inverse.Spline(rng.normal(size=(*shape, 12)))
+        spline = strip_inverse.StripSpline(rng.normal(size=(*shape, 12)))
         for count in (7, 7, 4):
             pair = rng.integers(shape[0], size=(2, count))
             i = rng.integers(shape[1] - 1, size=(2, count))
