@@ -240,3 +240,16 @@ def test_who_has_seen_nothing_says_that_it_has_not_moved():
         InstrumentError, match=r"did not come to the end of stroke 0: it is 2\.50 mm"
     ):
         monitor.refuse()
+
+
+def test_under_a_force_coupling_a_way_along_the_normal_asks_for_no_motion():
+    """A stroke that only lifts and sets down by 3 mm, and one that goes aside too."""
+    bob = np.outer(np.sin(np.pi * U), [0.0, 0.0, 3.0])
+    for aside, coupled, asks in ((0.0, True, False), (0.0, False, True), (4.0, True, True)):
+        monitor = ArrivalMonitor(plan(made(bob + line(aside))), 1.0, 0.0175, coupled)
+        assert monitor.started is not asks
+    # Half of the way aside is a beginning.
+    monitor = ArrivalMonitor(plan(made(bob + line(4.0))), 1.0, 0.0175, coupled=True)
+    monitor.see(at(START), 0)
+    monitor.see(at(START + [2.01, 0.0, 0.0]), 50)
+    assert monitor.started

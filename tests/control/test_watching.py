@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -370,3 +371,17 @@ def test_a_view_of_plans_shows_the_share_of_all_of_them():
         view.rows.groups,
         list(view.rows.texts),
     )
+
+
+def test_pipes_that_are_broken_or_closed_end_nothing_else(screen):
+    for error in (OSError, ValueError):
+
+        def fail(error=error):
+            raise error
+
+        seen = screen()
+        pipe, seen.stdin = seen.stdout, SimpleNamespace(close=fail)
+        seen.stdout = SimpleNamespace(close=fail)
+        watching._end(seen)
+        assert seen.calls == [f"wait {watching._PATIENCE}"]
+        seen.stdout = pipe

@@ -202,3 +202,12 @@ def test_a_real_sensor_needs_its_tool():
     workcell.need_tool(workcell.parse("mock:", "sensor"), given=False)
     with pytest.raises(InputError, match="--tool FILE"):
         workcell.need_tool(real, given=False)
+
+
+def test_a_mixed_bench_is_simulated_in_part_and_keeps_no_step_with_a_clock(installed):
+    mixed = workcell.connect("brand://h", "mock:", SimulatedClock(), allow_mixed=True)
+    assert (mixed.simulated, mixed.lock_step) == (True, False)
+    whole = workcell.connect("mock:", "mock:", SimulatedClock())
+    assert (whole.simulated, whole.lock_step, whole.note) == (True, True, None)
+    real = workcell.connect("brand://h", "brand://f", SimulatedClock())
+    assert (real.simulated, real.lock_step) == (False, False)
