@@ -9,6 +9,8 @@ import pytest
 import typer.testing
 from hypothesis import settings
 
+from dmpcli.messages import LOG
+
 # The machine may be busy: no test of ours asserts a time, and neither shall hypothesis.
 settings.register_profile("dmpcli", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("dmpcli")
@@ -35,6 +37,14 @@ def handlers_of_signals_are_put_back():
     for number, handler in zip(SIGNALS, before, strict=True):
         signal.signal(number, handler)
     assert after == before
+
+
+@pytest.fixture(autouse=True)
+def nobody_listens_any_more():
+    """A command that was called keeps its terminal: the next test hears messages by itself."""
+    yield
+    LOG.handlers.clear()
+    LOG.propagate = True
 
 
 def pytest_unconfigure():
