@@ -147,6 +147,7 @@ def served() -> Iterator[Store]:
     running.start()
     try:
         store.client().create_bucket(Bucket=BUCKET)
+        empty(store)  # of what another server of this process has left
         yield store
     finally:
         server.shutdown()

@@ -47,10 +47,7 @@ class Processes:
     def __call__(self, job: Job, parts: Iterable[Part]) -> Iterator[Outcome]:
         """Draw the parts."""
         if self._pool is None:
-            context = process_pool.context()
-            self._pool = ProcessPoolExecutor(
-                self._count, mp_context=context, initializer=_begin, initargs=(job,)
-            )
+            self._pool = process_pool.executor(self._count, _begin, job)
         waiting: set[Future[Outcome]] = set()
         done = False
         try:

@@ -3,7 +3,7 @@
 import signal
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 
 from dmpcli.arrays import Integers
@@ -37,9 +37,7 @@ class ReportProcesses:
     ) -> Iterator[MeasuredStrokes]:
         """Measure parts of a batch; see `reporting.batch.Measure`."""
         count = min(self._count, len(batch.files))
-        pool = ProcessPoolExecutor(
-            count, mp_context=process_pool.context(), initializer=_begin, initargs=(how,)
-        )
+        pool = process_pool.executor(count, _begin, how)
         begun: deque[Future[MeasuredStrokes]] = deque()
         try:
             for part, chosen in tasks:
