@@ -62,6 +62,7 @@ def swings(gains, stiffness, dead, tool=0.0, cycles=900):
     return max(seen[-150:]) / max(max(seen[-450:-150]), 1e-300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dead", [0.0, 0.05])
 @pytest.mark.parametrize("integral", [np.inf, 0.6])
 def test_the_smallest_damping_is_where_a_run_just_comes_to_rest(integral, dead):

@@ -71,6 +71,7 @@ def test_a_surface_off_the_plan_is_landed_on_gently(height, stiffness):
     assert rig.states == ["free", "seeking", "landing", "drawing"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 10.0])
 @pytest.mark.parametrize("wanted", [0.5, 1.0, 2.0])

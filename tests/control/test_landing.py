@@ -97,6 +97,7 @@ def test_the_way_in_goes_on_until_the_force_has_risen_beyond_its_noise(noise, ri
     assert felt - 3.0 == pytest.approx(rise, abs=0.02 + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_soft_contact_is_pressed_by_twenty_millimetres_at_the_most():
     _, depths, _ = landed(lambda depth: 0.06 * depth, wanted=9.0, cycles=9000)
     rest = next(i for i in range(2, len(depths)) if depths[i] == depths[i - 1])

@@ -53,6 +53,7 @@ def test_record_to_report(dmpcli, tmp_path):
     assert np.abs(run.position("plan") - run.position("sent")).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_pipe_of_the_readme(tmp_path):
     pipe = (
         "dmpcli record -o - | dmpcli fit - -o - | dmpcli generalize - -o - "
