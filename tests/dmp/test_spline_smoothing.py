@@ -203,5 +203,5 @@ def test_without_noise_the_variance_is_that_of_rounding_at_the_stroke_s_size(siz
     """A standard deviation of 1e-13 of the largest number on each of three axes."""
     x = size * np.array([[1.0, 0.2, 0.0], [-0.5, 0.0, 0.3]])
     none = noise.Noise(np.eye(3), np.zeros(3))
-    assert _variance(x, none) == pytest.approx(3.0 * (1e-13 * size) ** 2, rel=1e-12)
+    assert _variance(x, none) == pytest.approx(3.0 * (1e-13 * size) ** 2, rel=1e-12, abs=0.0)
     assert _variance(x, noise.Noise(np.eye(3), np.full(3, 2.0))) == pytest.approx(12.0)
