@@ -87,3 +87,9 @@ def test_an_outlier_is_five_times_as_far_as_the_others_and_beyond_the_noise():
     assert agreement.strangers(x[1:3], quiet[:2], none) == []
     shape = np.stack([x[0], x[1], PATH * [1.0, -8.0, 1.0]])
     assert [(d.index, d.kind) for d in agreement.strangers(shape, quiet, none)] == [(2, "shape")]
+
+
+def test_one_between_two_that_run_the_other_way_each_in_another_manner_is_the_one_told():
+    """One is recorded backward, the other seen in its own chart: far apart, and both against it."""
+    others = [PATH[::-1], backwards(PATH)]
+    assert told([PATH, *others]) == [(0, "opposite")]

@@ -127,3 +127,24 @@ def test_the_most_functions_stay_within_the_time_and_memory_of_their_samples(met
     tracemalloc.stop()
     assert found.quality.rms <= 0.02
     assert peak < 2**29  # a dense matrix alone would be 250 MB, and there were several
+
+
+def test_a_forced_response_is_negligible_by_the_extent_of_its_own_kind():
+    """Positions of extent 5 beside angles of extent 12: the two are not added up."""
+    u = np.linspace(0.0, 1.0, 11)[:, None]
+    demonstrated = u * [3.0, 4.0, 0.0, 12.0, 0.0, 0.0]
+    for size, factors in ((4.0, [1, 1]), (8.0, [3, 1]), (13.0, [3, 3])):
+        forced = np.full((11, 6), basis_search.NEGLIGIBLE * size)
+        found = basis_search._alpha_f(3.0 * forced, forced, demonstrated)
+        np.testing.assert_allclose(found, np.repeat(factors, 3), rtol=1e-12)
+
+
+def test_what_bulges_by_just_so_much_of_its_length_is_no_line():
+    length = 1024.0
+    for part, line in ((0.999, True), (1.0, False)):
+        half = 0.5 * part * basis_search.LINE * length
+        v = half * np.r_[np.sin(np.linspace(0.0, 2.0 * np.pi, 401))]
+        v[[100, 300]] = half, -half
+        x = np.column_stack([np.linspace(0.0, length, 401), v, 0.0 * v])
+        found = basis_search.waves(x, x)
+        assert found is None if line else found == pytest.approx((2.0 * half, 2.0 * half))

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmpcli.dmp import contact_heights as heights
 from dmpcli.dmp.contact_heights import ContactHeights, contact_heights, end_heights, pressed
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
@@ -108,3 +109,13 @@ def test_the_tool_presses_in_contact_and_not_where_it_is_lifted():
     np.testing.assert_array_equal(pressed(w, 3.0, found), [3.0, 3.0, 0.0])
     np.testing.assert_array_equal(pressed(np.array([0.4, -0.9, 8.4]), 3.0, None), [3.0, 3.0, 0.0])
     assert pressed(w, None, found) is None
+
+
+def test_a_pen_just_as_high_as_the_band_touches(monkeypatch):
+    """Its height is that of the part in contact, and is taken off."""
+    skill, x = taught(0.0), np.zeros((2001, 6))
+    x[:, 0], x[:, 2] = np.linspace(0.0, 100.0, 2001), 0.5
+    monkeypatch.setattr(heights, "demonstrated_scale", lambda *_: x)
+    found = contact_heights(skill, 0.5)
+    assert (found.removed, found.touching) == (0.5, pytest.approx(1.0))
+    assert contact_heights(skill, 0.499).removed == 0.0

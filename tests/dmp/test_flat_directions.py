@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from dmpcli.dmp import noise
-from dmpcli.dmp.flat_directions import moving_axes
+from dmpcli.dmp.flat_directions import _flat, moving_axes
 from dmpcli.spatial import rotations
 from tests.dmp.recordings import noisy, six_seconds
 
@@ -33,3 +34,14 @@ def test_a_bow_a_hop_and_a_spike_are_not(height, seconds):
 
 def test_one_direction_is_always_kept():
     assert moving(noisy(np.zeros((200, 4)), 0.1)).shape == (4, 1)
+
+
+@pytest.mark.parametrize("order", [1, 2, 512])
+def test_one_cosine_is_motion_where_noise_would_hardly_have_its_power(order):
+    """Octaves of 1024 samples: ten, and each may be taken for motion by a tenth of the chance."""
+    count = 1024
+    octave = 2 ** int(np.ceil(np.log2(order)))
+    limit = chi2.isf(1e-3 / 10, octave)
+    cosine = np.cos(np.pi * order * (np.arange(count) + 0.5) / count)
+    for part, flat in ((0.98, True), (1.02, False)):
+        assert _flat(np.sqrt(part * limit * 2.0 / count) * cosine) == flat

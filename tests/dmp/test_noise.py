@@ -169,3 +169,10 @@ def test_thirty_nine_samples_tell_no_noise_and_forty_do():
     assert noise.estimate(x[:39]).total == 0.0
     assert noise.estimate(x).kind == "white"
     assert noise.estimate(x).typical == pytest.approx(0.1, rel=0.5)
+
+
+def test_a_lattice_is_told_wherever_the_stroke_lies():
+    """It is coarse by the stroke's extent, whatever the distance from the base."""
+    _, points = six_seconds()
+    found = noise.estimate(np.round(points / 0.5) * 0.5 + [20000.0, 0.0, 0.0])
+    assert (found.kind, found.step) == ("quantised", pytest.approx(0.5))

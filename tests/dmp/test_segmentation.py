@@ -244,3 +244,24 @@ def test_between_two_strays_a_twentieth_of_the_points_must_be_left(bottom, told)
     )
     assert (found.approach is not None) == told
     assert (found.retract is not None) == told
+
+
+def test_a_turn_to_and_fro_without_noise_is_no_pause():
+    """It leaves its place at once, within fewer samples than a rest would take."""
+    x = np.r_[np.linspace(0.0, 100.0, 201), np.linspace(100.0, 0.0, 201)[1:]]
+    points = np.column_stack([x, np.zeros((len(x), 2))])
+    motion = segmentation._Motion(points, np.full(len(x), 50.0), 0.01, 1, 0.0)
+    first, last = segmentation._stay(motion, 198, 203, 0.6)
+    # 0.5 mm a sample: one on either side of the turn is within 0.6 mm of its place.
+    assert 198 <= first <= 200 <= last <= 202
+
+
+@pytest.mark.parametrize(("bottom", "told"), [(12.0, False), (15.5, False), (24.0, True)])
+def test_behind_an_approach_a_twentieth_of_the_points_must_be_left(bottom, told):
+    V = np.array([[0, 0, 100], [0, 0, 0], [bottom, 0, 0]], dtype=float)
+    way = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+    s = way[-1] * jerk(np.arange(301) / 300)
+    found = segments(
+        np.arange(301) / 100, np.column_stack([np.interp(s, way, c) for c in V.T]), DOWN
+    )
+    assert (found.approach is not None) == told

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.spatial import cKDTree
 
 from dmpcli.dmp import least_squares, noise
-from dmpcli.dmp.spline_smoothing import smooth
+from dmpcli.dmp.spline_smoothing import _variance, smooth
 from dmpcli.spatial import rotations
 from tests.dmp.recordings import (
     corners,
@@ -196,3 +196,12 @@ def test_averaged_samples_find_as_good_a_spline():
     spline = smoothed(t, noisy(truth, 0.3))
     assert errors(spline, t, truth).max() <= 0.1
     assert spline.intervals < 40
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 300.0])
+def test_without_noise_the_variance_is_that_of_rounding_at_the_stroke_s_size(size):
+    """A standard deviation of 1e-13 of the largest number on each of three axes."""
+    x = size * np.array([[1.0, 0.2, 0.0], [-0.5, 0.0, 0.3]])
+    none = noise.Noise(np.eye(3), np.zeros(3))
+    assert _variance(x, none) == pytest.approx(3.0 * (1e-13 * size) ** 2, rel=1e-12, abs=0.0)
+    assert _variance(x, noise.Noise(np.eye(3), np.full(3, 2.0))) == pytest.approx(12.0)

@@ -257,3 +257,18 @@ def test_an_attitude_that_passes_half_a_turn_is_resampled_without_a_jump():
     for index in (47.5, 50.25, 53.75):
         turn = rotations.log(made.at(index)[1] @ made.rotation[int(index)].T)
         assert np.linalg.norm(turn) < 0.02
+
+
+def test_a_plan_without_a_normal_says_so():
+    with pytest.raises(ValueError, match="no normal"):
+        plan(stroke()).normal_at(3)
+    tilted = plan(stroke(normal=(0.6, 0.0, 0.8)))
+    np.testing.assert_array_equal(tilted.normal_at(3), [0.6, 0.0, 0.8])
+
+
+@pytest.mark.parametrize(("distance", "goes"), [(0.9990, False), (1.0, True), (1.001, True)])
+def test_a_micrometre_is_gone_and_less_is_not(distance, goes):
+    goal = np.array([distance * planning._AT_START, 0.0, 0.0])
+    made = straight("approach", (np.zeros(3), PEN_DOWN), (goal, PEN_DOWN), 0.02, WIDE, 20.0)
+    assert gap((np.zeros(3), PEN_DOWN), (goal, PEN_DOWN))[0] == distance * planning._AT_START
+    assert (len(made.position) > 0) == goes
