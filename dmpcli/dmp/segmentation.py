@@ -401,7 +401,13 @@ def _end(motion: _Motion, part: slice, at: Floats, point: int, reverse: bool) ->
     low, high = max(0, point - back), min(_POINTS - 1, point + on)
     a, b = part.start + int(at[low]), part.start + int(at[high])
     stray = slice(b, part.stop) if reverse else slice(part.start, a + 1)
-    speed, position = motion.speed[a : b + 1], motion.position
+    speed, position = motion.speed[a : b + 1].copy(), motion.position
+    # Where the window reaches the recording's other end, the rest there is not a meeting.
+    about = part.start + int(at[point]) - a
+    if reverse and low == 0:
+        speed[: int(np.argmax(speed[: about + 1]))] = np.inf
+    elif not reverse and high == _POINTS - 1:
+        speed[about + int(np.argmax(speed[about:])) + 1 :] = np.inf
     slowest = int(np.argmin(speed))
     if len(motion.speed[stray]) and speed[slowest] <= _SLOW * motion.speed[stray].max():
         return int(a + slowest)

@@ -265,3 +265,20 @@ def test_behind_an_approach_a_twentieth_of_the_points_must_be_left(bottom, told)
         np.arange(301) / 100, np.column_stack([np.interp(s, way, c) for c in V.T]), DOWN
     )
     assert (found.approach is not None) == told
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("along", [16.0, 25.0, 60.0])
+def test_the_rest_at_the_recordings_own_end_is_not_where_a_short_stroke_is_met(along, turned):
+    """100 mm down and some along, at one pace without a rest: met at the corner."""
+    t = np.arange(301) / 100.0
+    way = (100.0 + along) * jerk(t / 3.0)
+    points = np.column_stack(
+        [np.clip(way - 100.0, 0.0, None), 0.0 * t, np.clip(100.0 - way, 0, None)]
+    )
+    corner = float(np.interp(100.0, way, t))
+    found = segments(t, points[::-1] if turned else points, DOWN)
+    assert (found.approach is None) is turned
+    assert (found.retract is None) is not turned
+    told = 3.0 - found.retract[0] if turned else found.approach[1]
+    assert told == pytest.approx(corner, abs=0.1)
