@@ -253,3 +253,11 @@ def test_under_a_force_coupling_a_way_along_the_normal_asks_for_no_motion():
     monitor.see(at(START), 0)
     monitor.see(at(START + [2.01, 0.0, 0.0]), 50)
     assert monitor.started
+
+
+def test_how_far_a_stroke_turns_counts_from_its_very_first_set_point():
+    drawn = plan(made(line(0.0), 0.0099 * U))
+    assert ArrivalMonitor(drawn, 1.0, 0.0175).started
+    drawn.rotation[drawn.lead :] = at(START, 0.006).rotation
+    drawn.rotation[drawn.lead], drawn.rotation[drawn.last] = PEN_DOWN, at(START, 0.012).rotation
+    assert not ArrivalMonitor(drawn, 1.0, 0.0175).started

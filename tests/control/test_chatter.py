@@ -96,3 +96,15 @@ def test_an_alarm_says_when_how_hard_and_what_it_has_made_of_the_preset():
     assert not detector.spent
     detector.alarms *= 3
     assert detector.spent
+
+
+def test_each_alarm_makes_it_sixteen_tenths_as_heavy_again_and_is_dated_to_the_microsecond():
+    detector, begun = ChatterDetector(PERIOD), 3e-6
+    due = []
+    for i, value in enumerate(6.0 * np.sin(2.0 * np.pi * 2.0 * T)):
+        if detector.feel(begun + i * PERIOD, np.array([0.0, 0.0, value]), DOWN):
+            due.append(begun + i * PERIOD)
+    found = [(alarm["t"], alarm["factor"]) for alarm in detector.alarms[:3]]
+    np.testing.assert_allclose([t for t, _ in found], due[:3], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose([factor for _, factor in found], [1.6, 2.56, 4.096])
+    assert detector.alarms[0]["factor"] == FACTOR

@@ -575,3 +575,26 @@ def test_a_force_that_has_not_settled_after_a_minute_never_will():
     slow.supervisor._clock = 60.0
     slow.cycle()
     assert slow.supervisor.failure.endswith(" behind a delay of 0.2 s")
+
+
+def test_a_force_that_stays_however_deep_it_is_followed_ends_the_run():
+    supervisor, t = at_work(clamp=30.0)
+    for k in range(1000):
+        supervisor.step(t + PERIOD * k, 1.0, 0.0, 5.0)
+        if supervisor.state != "drawing":
+            break
+    assert supervisor.state == "lost"
+    assert supervisor.failure == (
+        "1.00 N that does not rise with displacement: it is no contact; check the tool's zero"
+    )
+    assert not supervisor.urgent
+
+
+@pytest.mark.parametrize(("force", "state"), [(0.5, "lost"), (0.51, "landing")])
+def test_found_again_the_surface_must_push_by_more_than_the_threshold(force, state):
+    supervisor, t = at_work(on_loss="hold", patience=0.0)
+    for felt in (0.0, 1.0, 1.0):
+        supervisor.step(t, felt, 0.0, 5.0)
+    assert supervisor.state == "landing"
+    supervisor.step(t, force, 0.0, 5.0)
+    assert supervisor.state == state

@@ -223,3 +223,11 @@ def test_looking_back_takes_what_is_whole_and_fails_for_nothing():
             raise InstrumentError("the cable is out")
 
     assert Sensing(Broken(), INFO, 100.0, 0.02, SimulatedClock()).rest() == []
+
+
+@pytest.mark.parametrize("axis", [3, 4, 5])
+def test_a_torque_about_any_axis_counts(axis):
+    tool = replace(PEN, weight=0.0, centre=np.zeros(3), zero=np.zeros(6))
+    felt = sensing([Sample(0.0, 1, 0.21 * np.eye(6)[axis], True, 0)])
+    with pytest.raises(RefusedError, match=r"leaves 0\.00 N and 0\.210 N·m"):
+        felt.zeroed(tool, LEVEL, 0.5, 2.0)

@@ -128,3 +128,8 @@ def test_sinking_speeds_up_to_its_speed_and_turns_at_once():
     assert (state.speed, state.e) == (-4.0, pytest.approx(0.92))
     state = sinking(state, 7.0, PERIOD)
     assert (state.speed, state.e) == (-7.0, pytest.approx(0.78))
+
+
+@pytest.mark.parametrize(("left", "there"), [(np.nextafter(1e-9, 0.0), True), (1e-9, False)])
+def test_a_way_that_stands_still_is_at_its_goal_within_a_millionth_of_a_micrometre(left, there):
+    assert towards(LawState(0.0), left, 0.0, 0.02)[1] is there

@@ -13,6 +13,7 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Sample, SensorInfo
 from tests.control.streaming_fakes import WIDE, FakeClock, FakeServo, plan, rows_of, stroke
+from tests.control.test_arrival import line, made, tour
 
 WATCH = StopLimits(5.0, 0.1, 50.0, 5.0)
 PERIOD = 0.02
@@ -208,3 +209,16 @@ def test_a_force_coupling_needs_set_points():
     bench = Bench()
     with pytest.raises(InputError, match="leave mode=file out"):
         Playback(bench.plan, WIDE, WATCH, bench.arm, ForceInput(None, None, pressing=object()))
+
+
+def test_an_arm_whose_clock_is_behind_ours_has_that_much_longer_to_arrive():
+    """It is 0.14 s late, 0.09 s more than its look-ahead, and then at the end to a nanometre."""
+    first, second = tour(made(line(4.0), name="a"), made(line(4.0), name="b"))
+    clock = FakeClock(PERIOD)
+    servo = Player(clock, lookahead=0.05)
+    servo.delay = 0.14
+    arm = ReadyArm(servo, servo.info, clock)
+    watch = dataclasses.replace(WATCH, arrival=1e-6)
+    loop = Playback(first, WIDE, watch, arm, then=[second])
+    assert loop.run(Interruption()).reason == DONE
+    assert loop.drawn == ["a", "b"]

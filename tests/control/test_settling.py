@@ -1,8 +1,11 @@
 """Arms that come to rest, creep, or never rest: when it is said that they stand still."""
 
+import math
+
 import numpy as np
 import pytest
 
+from dmpcli.control import settling
 from dmpcli.control.settling import RestWindow, SettlingDetector
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
@@ -79,3 +82,18 @@ def test_an_arm_that_moves_for_more_than_two_seconds_has_failed(lookahead):
     assert settled(lookahead, lookahead + 1.9) < lookahead + 2.0
     with pytest.raises(InstrumentError, match="does not come to rest"):
         settled(lookahead, 9.0)
+
+
+@pytest.mark.parametrize(
+    ("apart", "still"),
+    [
+        ((0.02, 0.001), True),
+        ((math.nextafter(0.02, 1.0), 0.001), False),
+        ((0.02, math.nextafter(0.001, 1.0)), False),
+    ],
+)
+def test_two_hundredths_of_a_millimetre_and_a_milliradian_themselves_are_no_motion(
+    monkeypatch, apart, still
+):
+    monkeypatch.setattr(settling, "_apart", lambda *_: apart)
+    assert settling._near(at(0.0), at(0.0)) is still

@@ -291,3 +291,20 @@ def test_it_waits_for_five_periods_or_a_look_ahead(period, limit):
     assert dog._limit == pytest.approx(limit)
     dog.stop()
     assert dog._thread is None
+
+
+def test_once_the_arm_was_stopped_a_set_point_does_not_even_wait_for_its_turn():
+    class Busy:
+        def __enter__(self):
+            raise AssertionError("waits for a call that may hang")
+
+        def __exit__(self, *_):
+            pass
+
+    servo = Servo()
+    dog = watched(servo)
+    dog._barked, dog._lock = "the arm was stopped", Busy()
+    dog._settled.set()
+    with pytest.raises(InstrumentError, match="the arm was stopped"):
+        dog.send(HERE, LEVEL)
+    assert servo.calls == []

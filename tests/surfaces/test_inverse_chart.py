@@ -11,6 +11,7 @@ from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
 from dmpcli.surfaces.surface import Status
+from dmpcli.surfaces.tangential import Sought
 from tests.surfaces import cases, fields
 
 S = np.linspace(0.0, 1.0, 200)
@@ -231,3 +232,24 @@ def test_what_is_reached_is_told_by_truth_values():
     assert found.reached.dtype == bool
     assert (~found.reached).sum() == 5
     assert found.complete.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_piece_is_carried_on_to_another_turn_as_a_whole_or_left(monkeypatch, whole):
+    class One:
+        def rows(self, _):
+            return self
+
+    def solved(_charts, _position, at, free):
+        good = free.copy()
+        good[0, 7] = whole
+        return Sought(at, np.zeros((1, 10)), np.ones((1, 10)), good)
+
+    monkeypatch.setattr(inverse_chart, "solved", solved)
+    s = np.arange(10.0)
+    at = np.stack([s + 100.0 * (s >= 5.0), 0.0 * s], axis=-1)[None]
+    found = Sought(at.copy(), np.zeros((1, 10)), np.ones((1, 10)), np.ones((1, 10), dtype=bool))
+    carried = inverse_chart._counted_on(One(), s[None, :, None] * [1.0, 0.0, 0.0], found)
+    # From where the sample before the piece lies.
+    wanted = np.where(s >= 5.0, s - 1.0, s) if whole else at[0, :, 0]
+    np.testing.assert_array_equal(carried.at[0, :, 0], wanted)

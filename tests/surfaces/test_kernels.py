@@ -192,3 +192,14 @@ def test_vertices_that_lie_on_one_another_are_marked_and_of_a_smooth_mesh_none()
         marked = _split(geometry)
         assert marked[twice].all()
         assert marked.sum() <= 2 * twice.sum()
+
+
+def test_boxes_in_single_precision_hold_those_in_double():
+    from dmpcli.surfaces.kernels.mesh import _outwards
+
+    boxes = np.random.default_rng(3).uniform(-900.0, 900.0, (200, 6))
+    found = _outwards(boxes)
+    assert found.dtype == np.float32
+    assert (found[:, :3].astype(float) <= boxes[:, :3]).all()
+    assert (found[:, 3:].astype(float) >= boxes[:, 3:]).all()
+    np.testing.assert_allclose(found, boxes, rtol=3e-7)

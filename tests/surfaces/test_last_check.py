@@ -192,3 +192,12 @@ def test_both_points_beside_a_tear_are_unsound_and_what_leans_beyond_the_border_
     outside[0, 10] = True
     leaning = replace(feet, normal=normal, outside=outside)
     assert np.flatnonzero(last_check.unsound(mesh, leaning)[0]).tolist() == [9, 11]
+
+
+@pytest.mark.parametrize(("off", "right"), [(0.5, Status.DRAWN), (0.0, Status.MISSED)])
+def test_a_stroke_that_begins_beside_its_start_need_not_meet_it(off, right):
+    mesh, feet = sheet()
+    coordinates = feet.coordinates.copy()
+    coordinates[0, 0, 0] += off
+    beside = replace(moved(feet, 0, [0.02, 0.0, 0.0]), coordinates=coordinates)
+    assert status(mesh, beside) == right

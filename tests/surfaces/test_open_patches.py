@@ -163,3 +163,11 @@ def test_of_a_ball_the_upper_side_is_drawn_on_and_a_closed_stroke_is_not_turned(
     for patch in next(iter(places_for(V, F, circle))):
         np.testing.assert_array_equal(patch.start, patch.goal)
         assert patch.start[2] > 25.0
+
+
+def test_places_are_looked_for_on_eight_patches_unless_told_otherwise():
+    V, F = box((100.0, 60.0, 40.0))
+    two = np.concatenate([V, V + [300.0, 0.0, 0.0]]), np.concatenate([F, F + len(V)])
+    too_long = Footprint(0.0, np.array([[0.0, 0.0], [900.0, 0.0]]))
+    assert list(places_for(*two, too_long)) == [[]] * 8
+    assert list(places_for(*two, too_long, 12)) == [[]] * 12

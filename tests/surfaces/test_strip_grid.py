@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dmpcli.surfaces import strip_grid
+from dmpcli.surfaces import compiled_stepping, strip_grid
 from dmpcli.surfaces.strip_grid import Grid
+from tests.surfaces.test_mesh import folded
 
 
 @pytest.mark.parametrize("nodes", [5, 6, 9])
@@ -45,3 +46,16 @@ def test_lines_that_begin_off_the_mesh_look_to_the_last_one_on_it():
     found = strip_grid._last_on(away, 2).reshape(2, 6)
     assert found[0].tolist() == [1, 1, 2, 3, 3, 5]
     assert (found[1] - 6).tolist() == [0, 2, 2, 2, 2, 2]
+
+
+def test_a_mesh_without_kernels_is_walked_without_them(monkeypatch):
+    """They need what may not be installed."""
+
+    def start(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(compiled_stepping, "start", start)
+    mesh = folded(0.0)
+    begin, end = np.array([[[-20.0, 1.0, 0.0]], [[20.0, 1.0, 0.0]]])
+    lift = mesh.charts(begin, end).lift(np.array([[[0.0, 0, 0], [10.0, 5.0, 0], [40.0, 0, 0]]]))
+    np.testing.assert_allclose(lift.position[0, 1], [-10.0, 6.0, 0.0], atol=1e-9)

@@ -1,5 +1,7 @@
 """Strips inverted on their own nodes: what the chart drew is found, foot by foot."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
@@ -7,6 +9,7 @@ import trimesh
 from dmpcli.surfaces import strip_inverse
 from dmpcli.surfaces.inverse_chart import _by_steps, invert
 from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.strip_grid import Grid
 from tests.surfaces import cases
 
 S = np.linspace(0.0, 1.0, 120)
@@ -99,3 +102,14 @@ def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facet
     exact = strip_inverse.found(charts, drawn)
     assert exact.rows.tolist() == [0, 1]
     assert exact.miss.max() <= 1e-6
+
+
+def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkeypatch):
+    walked = []
+    monkeypatch.setattr(strip_inverse, "walk_nodes", lambda *given: walked.append(given[-1]))
+    charts = SimpleNamespace(mesh=None, centre=SimpleNamespace(step=np.ones((1, 1))))
+    at = np.array([[[0.5, 1.5]]])  # in the cell 3 along and 4 across
+    strip_inverse._Strip(charts, Grid(3, 4, 3, 4), np.ones((1, 1)), at, False)
+    wanted = np.zeros((1, 7, 7), dtype=bool)
+    wanted[0, 2:5, 3:6] = True
+    np.testing.assert_array_equal(walked[0], wanted)

@@ -5,6 +5,7 @@ import numpy as np
 from dmpcli.surfaces import tangential
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
+from dmpcli.surfaces.sphere import Sphere
 from tests.surfaces import fields
 
 PLATE = Plane(np.zeros(3), np.array([0.0, 0.0, 1.0]))
@@ -112,3 +113,37 @@ def test_the_nearer_of_two_feet_is_kept_unless_it_is_to_be_replaced():
     assert without.good.tolist() == [[False, True, False, True]]
     assert without.at[0, :, 1].tolist() == [7.0, 1.0, 1.0, 1.0]
     assert without.height[0].tolist() == [0.0, -1.0, 3.0, 1.0]
+
+
+def test_differences_are_taken_so_near_that_even_a_small_ball_is_nearly_flat_there():
+    """On a ball of 2 mm: a quotient over 1.5 mm would be off by a tenth."""
+    ball = Sphere(np.zeros(3), 2.0)
+    start = np.array([[2.0, 0.0, 0.0]])
+    one = ball.charts(start, np.array([[0.0, 2.0, 0.0]]))
+    free = np.ones((1, 1), dtype=bool)
+    search = tangential._NewtonState(one, start[:, None], np.zeros((1, 1, 2)), free, None)
+    search._difference(np.array([0]))
+    np.testing.assert_allclose(search.jacobian[0, 0], -np.eye(2), atol=0.02)
+
+
+def test_a_gap_of_just_a_nanometre_is_settled():
+    search = state(2, 1)
+    search.gap[:, 0, 0], search.gap[:, 0, 1] = [1e-6, np.nextafter(1e-6, 1.0)], 0.0
+    assert search.live().tolist() == [1]
+
+
+def test_a_gap_that_is_no_less_than_half_of_the_least_has_stalled(monkeypatch):
+    search = state(2, 1)
+    search.fresh[:], search.least[:] = True, 2.0
+    search.gap[:, 0], search.jacobian[:] = [2.0, 0.0], -np.eye(2)
+    now = np.array([[[1.0, 0.0]], [[np.nextafter(1.0, 0.0), 0.0]]])
+    monkeypatch.setattr(search, "_look", lambda *_: (now, np.zeros((2, 1))))
+    search.step(np.array([0, 1]))
+    assert search.stalled.tolist() == [[1], [0]]
+
+
+def test_nothing_is_learned_from_a_change_that_is_known_in_one_part_only():
+    J, free = -np.eye(2)[None, None], np.ones((1, 1), dtype=bool)
+    for change in ([np.nan, 1.0], [1.0, np.nan]):
+        found = tangential._carried_on(J, np.array([[[1.0, 2.0]]]), np.array([[change]]), free)
+        np.testing.assert_array_equal(found, J)
