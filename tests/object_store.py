@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import pytest
 from moto.server import DomainDispatcherApplication, create_backend_app
 from werkzeug.serving import WSGIRequestHandler, make_server
 
@@ -164,6 +165,18 @@ def empty(store: Store) -> None:
         for one in page.get("Contents", []):
             client.delete_object(Bucket=BUCKET, Key=one["Key"])
     store.requests.clear()
+
+
+@contextlib.contextmanager
+def used(store: Store, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
+    """This process uses the server, empty at first, and no other store."""
+    for name in [name for name in os.environ if name.startswith("AWS_")]:
+        monkeypatch.delenv(name)
+    for name, value in store.environment.items():
+        monkeypatch.setenv(name, value)
+    empty(store)
+    yield store
+    empty(store)
 
 
 def environment_of(store: Store) -> dict[str, str]:

@@ -209,8 +209,8 @@ def _way(whole: _Patches, number: int) -> tuple[Floats, Floats] | None:
     for axis in (axes[:, 2], axes[:, 1]):
         along = axis - (axis @ n) * n
         along = unit(along) if np.linalg.norm(along) > 1e-6 else any_tangent(n)
-        # From left to right as people read: in +x, or in +y.
-        along = along * (1.0 if (along[0], along[1]) > (1e-9, 0.0) or along[0] > 0.0 else -1.0)
+        # From left to right as people read: in +x, else in +y, else in +z.
+        along = along * np.sign(along[np.argmax(np.abs(along) > 1e-6)])
         long = float(np.ptp(across @ along))
         for share in _WAYS:
             length = share * long

@@ -17,7 +17,7 @@ from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.records.record import Form, Provenance
 from tests.batch.test_run import DMPCLI, content, write_pairs
 from tests.batch.test_run import learned as learned
-from tests.object_store import BUCKET, SECRETS, Fault, empty, environment_of, served
+from tests.object_store import BUCKET, SECRETS, Fault, environment_of, served, used
 from tests.records.meshes import box, written
 
 MANY = 230
@@ -32,13 +32,8 @@ def running():
 
 @pytest.fixture
 def store(running, monkeypatch):
-    for name in [name for name in os.environ if name.startswith("AWS_")]:
-        monkeypatch.delenv(name)
-    for name, value in running.environment.items():
-        monkeypatch.setenv(name, value)
-    empty(running)
-    yield running
-    empty(running)
+    with used(running, monkeypatch) as store:
+        yield store
 
 
 @pytest.fixture(scope="module")

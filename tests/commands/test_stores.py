@@ -1,7 +1,6 @@
 """What reads and writes files does it in an object store with the same bytes, or says why not."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 import dmpcli
 from tests.commands.running import ended
 from tests.commands.test_report_batch import FAILED, HEIGHTS, waves
-from tests.object_store import BUCKET, SECRETS, Fault, empty, served
+from tests.object_store import BUCKET, SECRETS, Fault, served, used
 from tests.reporting.batches import put_batch
 from tests.reporting.example_files import demonstration, put
 
@@ -25,13 +24,8 @@ def running():
 
 @pytest.fixture
 def store(running, monkeypatch):
-    for name in [name for name in os.environ if name.startswith("AWS_")]:
-        monkeypatch.delenv(name)
-    for name, value in running.environment.items():
-        monkeypatch.setenv(name, value)
-    empty(running)
-    yield running
-    empty(running)
+    with used(running, monkeypatch) as store:
+        yield store
 
 
 @pytest.fixture

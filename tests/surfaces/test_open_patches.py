@@ -47,6 +47,16 @@ def test_of_a_block_the_top_comes_first_and_the_way_is_along_its_longer_side():
     assert [round(one.area) for one in found[1:]] == [6000, 4000, 4000]
 
 
+@pytest.mark.parametrize(
+    ("size", "way"),
+    [((60.0, 100.0, 40.0), [0.0, 60.0, 0.0]), ((10.0, 60.0, 100.0), [0.0, 0.0, 60.0])],
+)
+def test_a_way_that_has_no_x_leads_towards_plus_y_and_one_without_both_upwards(size, way):
+    """Of the largest faces: the top, and a side that stands."""
+    found = max(open_patches(*box(size), 6), key=lambda one: one.area)
+    np.testing.assert_allclose(found.goal - found.start, way, atol=1e-9)
+
+
 def test_a_way_has_room_beside_it_also_where_the_middle_of_the_patch_is_near_its_rim():
     """An L of two blocks: the middle of its top lies at the inner corner."""
     outline = np.array([[0, 0], [100, 0], [100, 20], [20, 20], [20, 80], [0, 80]], dtype=float)
