@@ -192,7 +192,7 @@ class ForceTracker:
         zero = plan.rotation[number] @ self._zero
         felt = [(t, wrench[:3] - zero) for t, wrench in readings]
         step = plan.position[number] - plan.position[max(number - 1, 0)]
-        series, speed = against(felt, normal, step / plan.period)
+        series, speed = against(felt, normal, step / plan.period, self.sense.friction)
         reaction = supervisor.reaction + between
         self.wall = met(supervisor.across, series, speed, reaction, plan.period)
         if self.wall is not None:
