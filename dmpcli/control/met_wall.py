@@ -55,6 +55,28 @@ class MetWall:
         )
 
 
+def resisting(side: Sequence[float], way: Sequence[float], rub: float) -> float:
+    """Size of a force across the normal, N; 0 where it does more than friction to help the tool on.
+
+    What is met on the way resists: it takes work from the tool. An edge that the tool slides down
+    from gives some back, and there is nothing to stop for: where the part ends the contact is lost,
+    and at a step it is found again.
+
+    Parameters
+    ----------
+    side : sequence of float
+        Force on the tool across the normal, N.
+    way : sequence of float
+        Of the stroke in this cycle, mm.
+    rub : float
+        Friction that was felt, N.
+    """
+    x, y, z = side
+    u, v, w = way
+    helps = x * u + y * v + z * w + rub * math.sqrt(u * u + v * v + w * w)
+    return 0.0 if helps > 0.0 else math.sqrt(x * x + y * y + z * z)
+
+
 def against(
     felt: Sequence[tuple[float, Floats]], normal: Floats, velocity: Floats, friction: float
 ) -> tuple[list[tuple[float, float]], float]:

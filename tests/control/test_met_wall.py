@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dmpcli.control.met_wall import against, met
+from dmpcli.control.met_wall import against, met, resisting
 
 
 def rising(begin, slope, until, since=0.0, every=0.01, most=200):
@@ -71,3 +71,29 @@ def test_where_nothing_was_felt_nothing_is_said(felt):
 
 def test_nor_of_a_tool_that_does_not_move():
     assert met(4.0, rising(0.0, 100.0, 1.0), 0.0, 0.05, 0.02) is None
+
+
+@pytest.mark.parametrize("turn", [0.0, 50.0, -80.0, 85.0])
+def test_a_wall_that_the_tool_runs_into_resists_with_all_of_its_force(turn):
+    """At any slant, with friction on wall and floor: its force takes work from the tool."""
+    angle = np.radians(turn)
+    wall, beside = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    way = 0.4 * (-np.cos(angle) * wall + np.sin(angle) * beside)
+    heading = way / np.linalg.norm(way)
+    side = 6.0 * (wall - 0.2 * np.sign(turn) * beside) - 0.2 * 5.0 * heading
+    assert resisting(side, way, 0.2 * 5.0) == pytest.approx(np.linalg.norm(side))
+
+
+@pytest.mark.parametrize("turn", [0.0, 50.0, -80.0])
+def test_an_edge_that_the_tool_slides_down_from_resists_nothing(turn):
+    angle = np.radians(turn)
+    off = np.array([0.6, 0.8, 0.0])
+    beside = np.array([-0.8, 0.6, 0.0])
+    way = 0.3 * (np.cos(angle) * off + np.sin(angle) * beside)
+    heading = way / np.linalg.norm(way)
+    side = 4.4 * off - 0.2 * 5.0 * heading
+    assert resisting(side, way, 0.2 * 5.0) == 0.0
+
+
+def test_beside_a_tool_that_does_not_move_every_force_counts():
+    assert resisting((3.0, 4.0, 0.0), (0.0, 0.0, 0.0), 1.0) == 5.0
