@@ -107,10 +107,14 @@ def against(
     """
     sides = [force - float(normal @ force) * normal for _, force in felt]
     sizes = [math.sqrt(side @ side) for side in sides]
-    largest, pace = max(sizes), math.sqrt(velocity @ velocity)
+    largest, pace = sizes.index(max(sizes)), math.sqrt(velocity @ velocity)
     speed = 0.0
-    if largest and pace:
-        share = abs(float(velocity @ sides[sizes.index(largest)])) / (largest * pace)
+    if sizes[largest] and pace:
+        # What the surface rubs with is none of the wall's.
+        rub = friction * max(float(normal @ felt[largest][1]), 0.0) / pace
+        wall = sides[largest] + rub * velocity
+        size = math.sqrt(wall @ wall) * pace
+        share = abs(float(velocity @ wall)) / size if size else 0.0
         lean = math.acos(min(share, 1.0)) + math.atan(friction)
         speed = pace * math.cos(min(lean, math.pi / 2.0))
     return list(zip((t for t, _ in felt), sizes, strict=True)), speed

@@ -17,6 +17,7 @@ from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.records import file_io, record, schemas
 from dmpcli.records import tool as tool_file
 from dmpcli.records.record import Provenance, Record
+from tests.bench.descriptions import mjcf
 from tests.extras_here import needs
 from tests.instruments.instrument_conformance import check_sensor, check_servo
 
@@ -204,3 +205,27 @@ def test_a_tool_file_that_is_not_the_benchs_tool_is_refused(stroke, tmp_path):
     )
     assert "mm" in said
     assert not (tmp_path / "run.parquet").exists()
+
+
+@pytest.mark.slow
+def test_a_slow_stroke_over_a_step_on_a_described_arm_finds_the_surface_again(stroke, tmp_path):
+    """The ball rolls down the edge, which pushes it on by twice what friction may be."""
+    arm, truth, out = tmp_path / "arm.xml", tmp_path / "truth.parquet", tmp_path / "run.parquet"
+    arm.write_text(mjcf(d4=0.134))
+    robot = (
+        f"bench://ur5e?model={arm}&z={START[2] + 12.0}&at_z={START[2]}&truth={truth}"
+        "&surface=step&along=240&far=3"
+    )
+    said = execute(
+        stroke, "-o", out, "--robot", robot, "--sensor", "bench://ur5e", "--tool", TOOL,
+        "--coupling", "force", "--force-setpoint", 5, "--approach", 20,
+    )  # fmt: skip
+    assert "bench: ur5e with d4 134 instead of 133.3 mm" in said
+    kept = record.decode(file_io.read(str(out)), schemas.RUN)
+    push, cycle = (pq.read_table(truth)[name].to_numpy() for name in ("push", "setpoint"))
+    drawn = np.flatnonzero(np.asarray(kept.columns["phase"]) == "stroke")
+    last = push[(cycle > drawn[-1] - 25) & (cycle <= drawn[-1])]
+    assert last.min() > 4.0
+    assert last.max() < 6.0
+    tip = pq.read_table(truth)["z"].to_numpy()[cycle == drawn[-1]]
+    assert tip.max() < START[2] - 2.5  # on the lower side

@@ -44,17 +44,18 @@ def test_one_reading_that_felt_the_wall_is_taken_to_have_risen_for_a_period_and_
 @pytest.mark.parametrize("slant", [30.0, -35.0, 60.0])
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
 def test_what_slides_along_a_wall_that_rubs_is_no_speed_against_it(friction, slant, up):
-    """Coulomb: the force leans from the wall's normal, against the sliding."""
+    """Coulomb: the force leans from the wall's normal, against the sliding; the floor rubs too."""
     up = np.array(up)
     wall = np.cross(up, [0.0, 1.0, 0.0])
     wall /= np.linalg.norm(wall)
     beside, turn = np.cross(up, wall), np.radians(slant)
     velocity = 30.0 * (-np.cos(turn) * wall + np.sin(turn) * beside)
-    force = 12.0 * (wall - friction * np.sign(slant) * beside) + 5.0 * up
+    met_ = 12.0 * (wall - friction * np.sign(slant) * beside)
+    force = met_ + 5.0 * (up - friction * velocity / 30.0)
     series, speed = against([(0.0, 0.1 * force), (0.01, force)], up, velocity, friction)
     assert speed == pytest.approx(30.0 * np.cos(turn))
     assert [t for t, _ in series] == [0.0, 0.01]
-    assert series[1][1] == pytest.approx(12.0 * np.hypot(1.0, friction))
+    assert series[1][1] == pytest.approx(np.linalg.norm(force - 5.0 * up))
 
 
 def test_a_force_along_the_way_is_no_wall():
@@ -62,6 +63,8 @@ def test_a_force_along_the_way_is_no_wall():
     _, speed = against([(0.0, np.array([0.0, 3.0, 0.0]))], up, np.array([9.0, 0.0, 0.0]), 0.3)
     assert speed == pytest.approx(0.0, abs=1e-12)
     assert against([(0.0, 2.0 * up)], up, np.array([9.0, 0.0, 0.0]), 0.3)[1] == 0.0
+    rubs = 2.0 * up - np.array([0.5, 0.0, 0.0])
+    assert against([(0.0, rubs)], up, np.array([9.0, 0.0, 0.0]), 0.25)[1] == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("felt", [[], [(0.0, 0.0), (0.01, 0.0)]])
