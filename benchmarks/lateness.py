@@ -42,6 +42,7 @@ from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN, Scene
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from dmpcli.spatial.wrench import Tool
 
 BLOCKS = 3
@@ -145,7 +146,7 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     # There and back: the next block begins where this one did.
     away = np.sin(np.pi * u) ** 2
     wave = np.column_stack([-109.0 * away, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
-    stroke = planning.PlannedStroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
+    stroke = StrokeTrajectory(t, np.array([-551.03, 131.4, -17.56]) + wave, None, id="0")
     clock = Metered()
     bench = at.connect(clock, execution.scene(stroke, presses=False))
     servo = watched(bench.robot)

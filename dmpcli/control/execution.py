@@ -17,7 +17,6 @@ from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.force_tracking import LONG, ForceInput, ForceTracker
 from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
 from dmpcli.control.servo_loop import DONE, PlanLoop
-from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.errors import InputError
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Sensor, Servo
 from dmpcli.kinematics import models
@@ -25,14 +24,17 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import limits_of
-from dmpcli.planning.plan import Plan, PlannedStroke
+from dmpcli.planning.plan import Plan
 from dmpcli.planning.preflight import Check
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import EULER_ANGLES, JOINTS, POSITION
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import COUPLED, ExecuteSettings
 from dmpcli.simulation.mock import Plate, Scene
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from dmpcli.spatial.wrench import Tool
 
 SENSOR_RATE = 100.0
@@ -45,7 +47,7 @@ DRIFTED = 0.15
 ZERO_TIME = 0.5
 
 
-def scene(stroke: PlannedStroke, presses: bool, height: float = 0.0) -> Scene:
+def scene(stroke: StrokeTrajectory, presses: bool, height: float = 0.0) -> Scene:
     """Return the mock lab where its URL says nothing.
 
     The arm is parked at the stroke's first pose. There is a plate only for a force coupling, which
@@ -53,7 +55,7 @@ def scene(stroke: PlannedStroke, presses: bool, height: float = 0.0) -> Scene:
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     presses : bool
         Whether the force coupling is on.
     height : float
@@ -69,13 +71,16 @@ def scene(stroke: PlannedStroke, presses: bool, height: float = 0.0) -> Scene:
 
 
 def prepare(
-    stroke: PlannedStroke, settings: ExecuteSettings, state: RobotState, reach: Reach | None = None
+    stroke: StrokeTrajectory,
+    settings: ExecuteSettings,
+    state: RobotState,
+    reach: Reach | None = None,
 ) -> tuple[Plan, list[Check]]:
     """Plan the stroke from where the arm stands, and judge it.
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     settings : ExecuteSettings
     state : RobotState
     reach : Reach, optional
@@ -93,7 +98,7 @@ def prepare(
         The arm is not ready.
     """
     guards.check_ready(state)
-    start = (state.position, state.rotation)
+    start = state.pose
     near = standing(stroke, settings, state) if settings.approach is None else []
     made = planning.make(
         stroke,
@@ -103,19 +108,19 @@ def prepare(
         start,
         settings.approach or settings.lead_speed,
     )
-    joints = None if reach is None else reach.standing(state.joints, *start)
+    joints = None if reach is None else reach.standing(state.joints, start)
     return made, judge(stroke, made, settings, near, reach, joints)[0]
 
 
-def standing(stroke: PlannedStroke, settings: ExecuteSettings, state: RobotState) -> list[Check]:
+def standing(stroke: StrokeTrajectory, settings: ExecuteSettings, state: RobotState) -> list[Check]:
     """Check that the arm stands at a stroke's start."""
     goal = state.rotation if stroke.rotation is None else stroke.rotation[0]
-    gap = planning.gap((state.position, state.rotation), (stroke.position[0], goal))
+    gap = state.pose.apart(Pose(stroke.position[0], goal))
     return preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)
 
 
 def judge(
-    stroke: PlannedStroke,
+    stroke: StrokeTrajectory,
     plan: Plan,
     settings: ExecuteSettings,
     near: list[Check],
@@ -126,7 +131,7 @@ def judge(
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     plan : Plan
     settings : ExecuteSettings
     near : list of Check
@@ -228,12 +233,10 @@ def touch(
     return ForceInput(sensing, Compensation(zeroed), pressing)
 
 
-def coupling_filter(
-    stroke: PlannedStroke, facts: Mapping[str, Any], settings: ExecuteSettings
-) -> Filter:
+def coupling_filter(stroke: StrokeTrajectory, settings: ExecuteSettings) -> Filter:
     """Return the filter of eq. (10) on the normal axis.
 
-    Where the facts state no tau, the stroke's duration stands for it: the time constant that
+    Where its file states no tau, the stroke's duration stands for it: the time constant that
     `fast_filter` chooses does not depend on tau, the gains k and d that it logs do.
 
     Raises
@@ -247,11 +250,11 @@ def coupling_filter(
             "make it anew with generalize"
         )
     settings.setpoint(_largest(stroke))
-    tau = float(facts.get("tau") or stroke.t[-1] - stroke.t[0])
+    tau = float(stroke.facts.get("tau") or stroke.t[-1] - stroke.t[0])
     return fast_filter(tau / settings.speed, settings.period)
 
 
-def _largest(stroke: PlannedStroke) -> float | None:
+def _largest(stroke: StrokeTrajectory) -> float | None:
     return None if stroke.force is None else float(stroke.force.max())
 
 
@@ -313,7 +316,7 @@ def coupling_of(batch: StrokeSelection, settings: ExecuteSettings, weight: float
         As `coupling_filter`, for any of them; or the gains are unstable.
     """
     settings.chosen_gains(1e-3 * weight / GRAVITY)
-    filters = [coupling_filter(found.stroke, found.facts, settings) for found in batch.found]
+    filters = [coupling_filter(stroke, settings) for stroke in batch.strokes]
     return filters[0]
 
 

@@ -31,7 +31,8 @@ from dmpcli.control.step_limits import StepLimits, check_start
 from dmpcli.errors import DmpError, InputError, RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Pose
+from dmpcli.planning.plan import Plan
+from dmpcli.spatial.pose import Pose
 
 DONE = "done"
 
@@ -157,10 +158,10 @@ class PlanLoop(ControlLoop):
         if pressing is None or touch is None or last is None:
             return failure
         if failure is None and self._rested:
-            pressing.clear(touch.look_back(last[1]), last[1])
+            pressing.clear(touch.look_back(last.rotation), last.rotation)
         if pressing.supervisor.across is None or str(failure) != pressing.failure:
             return failure
-        readings = touch.look_back(last[1])
+        readings = touch.look_back(last.rotation)
         pressing.look_back(self._cursor.index, readings, touch.sensing.interval)
         return RefusedError(pressing.failure)
 
@@ -314,7 +315,7 @@ class PlanLoop(ControlLoop):
     def _record(self, cycle: Cycle, setpoint: Pose | None, lateness: float | None) -> None:
         index, state = self._cursor.index, cycle.state
         draws = self.plan.draws_at(index)
-        actual = (state.position, state.rotation)
+        actual = state.pose
         switched, failure = self._switched, None
         if self._outputs is not None and setpoint is not None:
             now, self._switched = self._arm.clock.now() - self._begin, ""
@@ -379,13 +380,14 @@ class ServoLoop(PlanLoop):
         if pressing is not None and cursor.waiting and pressing.settled:
             cursor.release()
         index = cursor.index
-        position, rotation = self.plan.at(index)
+        setpoint = self.plan.at(index)
         if pressing is not None:
-            position = position + self._pressed(pressing, cycle, index)
+            pressed = setpoint.position + self._pressed(pressing, cycle, index)
+            setpoint = Pose(pressed, setpoint.rotation)
             if pressing.supervisor.urgent:
                 raise RefusedError(pressing.failure)
-        self._steps.check(self._last, position, rotation)
-        return position, rotation
+        self._steps.check(self._last, setpoint)
+        return setpoint
 
     def _pressed(self, pressing: ForceTracker, cycle: Cycle, index: float) -> Floats:
         """Return what the force coupling adds to the set-point, shape (3,), mm."""

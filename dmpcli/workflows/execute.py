@@ -14,7 +14,6 @@ from dmpcli.control import (
     ownership,
     preflight_table,
     stopping,
-    stroke_file,
     watching,
     workcell,
 )
@@ -22,7 +21,6 @@ from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
-from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
@@ -30,10 +28,11 @@ from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
-from dmpcli.records import file_io, suffixes, tolerance_mark
+from dmpcli.records import file_io, stroke_selection, suffixes, tolerance_mark
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import RUN
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.wrench import Tool
 from dmpcli.workflows import moving_goals
@@ -174,9 +173,9 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     _warn_of(batch, _name(request.trajectory))
     # What weighs on the sensor counts only where there is one.
     held = _decoded(tool_file, weighed=request.sensor is not None)
-    first = batch.found[0]
+    first = batch.strokes[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
-    scene = execution.scene(first.stroke, request.presses, above)
+    scene = execution.scene(first, request.presses, above)
     weight = (held or scene.tool).weight
     coupling = execution.coupling_of(batch, settings, weight) if request.presses else None
     realtime = request.realtime or not repeatable
@@ -265,13 +264,13 @@ def _tell_of(loop: PlanLoop, realtime: bool) -> None:
 
 def _found(request: ExecutionRequest) -> StrokeSelection:
     """Return the strokes that are to be drawn, with the outputs that they are to switch."""
-    batch = stroke_file.find(request.trajectory, request.ids)
+    batch = stroke_selection.find(request.trajectory, request.ids)
     names = outputs.names_of(batch.strokes)
     if not request.ignore_events:
         return batch
     if names:
         warn(f"{', '.join(names)}: not switched, as --ignore-events asks")
-    return stroke_file.without_events(batch)
+    return batch.without_events()
 
 
 def _name(trajectory: str | Source) -> str:
@@ -286,7 +285,7 @@ def _warn_of(batch: StrokeSelection, name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
     if batch.failed:
         warn(execution_plan.passed_over(batch.failed))
-    mark = tolerance_mark.of_facts(batch.found[0].facts)
+    mark = tolerance_mark.of_facts(batch.strokes[0].facts)
     if mark is not None:
         warn(tolerance_mark.text(name, mark))
 
@@ -299,7 +298,7 @@ def _judged(
     request: ExecutionRequest,
 ) -> list[CheckedPlan]:
     """Plan and check every stroke from where the arm stands."""
-    with progress("checking", len(batch.found)) as advance:
+    with progress("checking", len(batch.strokes)) as advance:
         return execution_plan.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
@@ -401,8 +400,8 @@ def _provenance(
         options["id"] = list(request.ids) or None
         facts |= execution_plan.facts_of(batch)
     else:
-        options["id"] = batch.found[0].stroke.id
-        facts["trajectory"] = batch.found[0].facts
+        options["id"] = batch.strokes[0].id
+        facts["trajectory"] = batch.strokes[0].facts
     return Provenance("execute", options, tuple(inputs), facts)
 
 

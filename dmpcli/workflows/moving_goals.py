@@ -7,7 +7,6 @@ from typing import Any
 from dmpcli.arrays import Floats
 from dmpcli.control import goal_following
 from dmpcli.control.goal_following import GoalFollower, GoalOptions
-from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.dmp.goal_step import GoalFilter
 from dmpcli.errors import InputError
 from dmpcli.instruments import goal_sources
@@ -19,6 +18,7 @@ from dmpcli.planning.plan import Plan
 from dmpcli.records import file_io, goal_table
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, input_of
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
 
 _UDP = "udp:"
@@ -135,14 +135,14 @@ def wanted(said: str | None, batch: StrokeSelection, settings: ExecuteSettings) 
     """
     if said is None:
         return MovingGoals()
-    if len(batch.found) > 1:
+    if len(batch.strokes) > 1:
         raise InputError(
-            f"--goal-from: moves the goal of one stroke, and {len(batch.found)} are to be drawn; "
+            f"--goal-from: moves the goal of one stroke, and {len(batch.strokes)} are to be drawn; "
             "name one with --id"
         )
-    found = batch.found[0]
-    normal = goal_following.plane_of(found.stroke, found.facts)
-    filter_ = goal_following.filter_of(found.facts, settings.speed, settings.period)
+    stroke = batch.strokes[0]
+    normal = goal_following.plane_of(stroke)
+    filter_ = goal_following.filter_of(stroke.facts, settings.speed, settings.period)
     if said.startswith(_UDP):
         goal_sources.check(said)
         return MovingGoals(Asked(said, None, None, filter_, normal))

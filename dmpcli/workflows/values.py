@@ -22,13 +22,13 @@ from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import OK
 from dmpcli.records.storage import Location
-from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
+from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.spatial.rotations import from_euler, to_euler
-from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.spatial.trajectory import StrokeTrajectory, Trajectory
 from dmpcli.workflows import batches
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.recording import recording
@@ -59,7 +59,7 @@ class Demonstration(Trajectory):
 
 
 @dataclass(frozen=True)
-class DrawnTrajectory(StoredTrajectory):
+class DrawnTrajectory(StrokeTrajectory):
     """A trajectory with the record that it is written as, and the file that it was read from."""
 
     record: Record | None = field(default=None, repr=False, compare=False)
@@ -260,7 +260,7 @@ def record_of(one: Trajectory) -> Record:
     if one.normal is not None:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
         columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
-    if isinstance(one, StoredTrajectory) and one.force is not None:
+    if isinstance(one, StrokeTrajectory) and one.force is not None:
         columns["fn"] = one.force
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
 

@@ -18,6 +18,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.planning.plan import joined, sample, straight
+from dmpcli.spatial.pose import Pose
 from tests.control.fake_sensors import PolledSensor
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, stroke
 
@@ -41,7 +42,7 @@ def drawn(force, over, coupled=True, duration=3.0, **policy):
     """Draw a stroke and lift the tool off it by 20 mm; returns plan, loop and what was sent."""
     source = dataclasses.replace(stroke(duration, normal=UP), force=force)
     at = sample(source, PERIOD, 1.0, PEN_DOWN)
-    up = (at.position[-1] + [0.0, 0.0, 20.0], at.rotation[-1])
+    up = Pose(at.position[-1] + [0.0, 0.0, 20.0], at.rotation[-1])
     made = joined(
         at, [], [straight("retract", at.pose(-1), up, PERIOD, WIDE, 50.0, 15.0)], PERIOD, True
     )

@@ -13,17 +13,17 @@ from dmpcli.control import execution
 from dmpcli.control.contact_policy import ContactEvent, ContactPolicy
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.normal_sensing import NormalPolicy
-from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.instruments.protocols import RobotState, SensorInfo
 from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.records import schemas
 from dmpcli.records.record import Provenance
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.simulation.mock import PEN
 from dmpcli.spatial.rotations import exp_one
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.fake_sensors import StreamingSensor
 from tests.control.streaming_fakes import PEN_DOWN, START, FakeClock, FakeServo, plan, stroke
 from tests.control.test_servo_loop import Bench
@@ -34,7 +34,9 @@ def straight(duration, length=100.0):
     """A straight minimum-jerk stroke along x."""
     source = stroke(duration)
     way = length * minimum_jerk(source.t / duration)
-    return PlannedStroke("0", source.t, START + way[:, None] * [1.0, 0.0, 0.0], source.rotation)
+    return StrokeTrajectory(
+        source.t, START + way[:, None] * [1.0, 0.0, 0.0], source.rotation, id="0"
+    )
 
 
 def failed(source, position=START, **options):
@@ -67,8 +69,8 @@ def test_the_plate_lies_under_a_stroke_that_begins_with_a_lifted_pen():
     normal = np.array([0.0, 0.6, 0.8])
     foot = np.array([300.0, 20.0, -5.0])
     position = foot + 8.0 * normal + np.linspace(0.0, 50.0, 11)[:, None] * [1.0, 0.0, 0.0]
-    stroke = PlannedStroke(
-        "1", np.linspace(0.0, 2.0, 11), position, None, np.tile(normal, (11, 1)), 1
+    stroke = StrokeTrajectory(
+        np.linspace(0.0, 2.0, 11), position, None, np.tile(normal, (11, 1)), id="1"
     )
     lab = execution.scene(stroke, presses=True, height=8.0)
     assert lab.plate.point == pytest.approx(foot)
@@ -78,7 +80,7 @@ def test_the_plate_lies_under_a_stroke_that_begins_with_a_lifted_pen():
 
 
 def selection(*strokes, facts=None):
-    found = tuple(FoundStroke(one, dict(facts or {"tau": 4.0})) for one in strokes)
+    found = tuple(dataclasses.replace(one, facts=dict(facts or {"tau": 4.0})) for one in strokes)
     return StrokeSelection(found, {}, (), len(strokes) > 1)
 
 
@@ -133,7 +135,7 @@ def test_the_filter_is_that_of_the_strokes_tau_at_the_speed_and_period_of_the_ru
     settings = ExecuteSettings(speed=speed, period=0.01)
     pressed = stroke(normal=UP)
     for facts, tau in (({"tau": 4.0}, 4.0), ({}, 10.0), ({"tau": None}, 10.0)):
-        found = execution.coupling_filter(pressed, facts, settings)
+        found = execution.coupling_filter(dataclasses.replace(pressed, facts=facts), settings)
         own = fast_filter(tau / speed, 0.01)
         assert (found.tau, found.k, found.d, found.alpha_e) == (
             pytest.approx((tau / speed, own.k, own.d, own.alpha_e))
@@ -143,7 +145,7 @@ def test_the_filter_is_that_of_the_strokes_tau_at_the_speed_and_period_of_the_ru
     batch = selection(pressed, dataclasses.replace(pressed, t=2.0 * pressed.t), facts={"k": 1.0})
     assert execution.coupling_of(batch, settings, 5.0).tau == pytest.approx(10.0 / speed)
     late = dataclasses.replace(pressed, t=pressed.t + 100.0)
-    assert execution.coupling_filter(late, {}, settings).tau == pytest.approx(10.0 / speed)
+    assert execution.coupling_filter(late, settings).tau == pytest.approx(10.0 / speed)
     with pytest.raises(InputError, match="no surface normal"):
         execution.coupling_of(selection(pressed, stroke()), settings, 5.0)
 
@@ -151,8 +153,8 @@ def test_the_filter_is_that_of_the_strokes_tau_at_the_speed_and_period_of_the_ru
 def test_a_set_point_or_gains_that_must_not_be_are_refused_before_anything_moves():
     hard = dataclasses.replace(stroke(normal=UP), force=np.linspace(0.0, 50.0, 501))
     with pytest.raises(InputError, match="the trajectory's fn = 50"):
-        execution.coupling_filter(hard, {}, ExecuteSettings())
-    execution.coupling_filter(hard, {}, ExecuteSettings(max_force=50.1))
+        execution.coupling_filter(hard, ExecuteSettings())
+    execution.coupling_filter(hard, ExecuteSettings(max_force=50.1))
     with pytest.raises(InputError, match="coupling_mass"):
         execution.coupling_of(selection(stroke(normal=UP)), ExecuteSettings(coupling_mass=1.0), 5.0)
 
