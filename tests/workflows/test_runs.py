@@ -211,7 +211,7 @@ def test_values_without_a_file_are_called_what_they_are(taught, drawn):
     for strokes, said, words in [
         ((), {}, "no stroke to report"),
         ((taught, drawn), {"names": ("one", "one")}, "different names"),
-        ((3.0,), {}, "a float is nothing"),
+        ((3.0,), {}, "float is no demonstration"),
         ((taught,), {"output": REFERENCE}, "is a file, -o needs"),
     ]:
         with pytest.raises(dmpcli.InputError, match=words):
