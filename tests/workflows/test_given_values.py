@@ -4,6 +4,7 @@ import copy
 import logging
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import dmpcli
 T = np.linspace(0.0, 4.0, 201)
 S = 10.0 * (T / 4.0) ** 3 - 15.0 * (T / 4.0) ** 4 + 6.0 * (T / 4.0) ** 5
 P = np.column_stack([100.0 * S, 30.0 * np.sin(2.0 * np.pi * S), 0.0 * S])
+NUMBER: Any = 3
 TURN = Rotation.from_euler("XYZ", np.column_stack([np.full(201, np.pi), 0.0 * S, 0.5 * S]))
 R = TURN.as_matrix()
 HERE, THERE = (0.0, 0.0, 0.0), (120.0, 0.0, 0.0)
@@ -90,7 +92,7 @@ def test_numbers_in_any_dress_are_the_same_stroke(given):
         (lambda _: dmpcli.generalize("skill.json", HERE, THERE), "str is no skill"),
         (lambda one: dmpcli.generalize(one, HERE, THERE), "is no skill"),
         (lambda _: dmpcli.wave_heights(P), "ndarray is no trajectory"),
-        (lambda _: dmpcli.execute(*[3]), "int is no trajectory"),
+        (lambda _: dmpcli.execute(NUMBER), "int is no trajectory"),
         (lambda _: dmpcli.report([1]), "list is no demonstration"),
         (lambda _: dmpcli.read("t.parquet", sep=";"), "sep: no such option"),
     ],
