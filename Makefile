@@ -159,7 +159,8 @@ judges:
 	@sh tools/linuxcnc.sh $(OUT)/judges/linuxcnc
 	DMPCLI_JUDGES=required DMPCLI_LINUXCNC=$(OUT)/judges/linuxcnc $(JUDGES)/bin/python -m pytest -o cache_dir=$(CACHE)/pytest -p no:xdist \
 	    tests/formats/test_outside_judges.py tests/formats/test_lerobot_dataset.py \
-	    tests/metrics/test_pose_error.py tests/commands/test_report_pose_error.py
+	    tests/metrics/test_pose_error.py tests/commands/test_report_pose_error.py \
+	    tests/bench/test_description.py
 
 # What people look at, looked at in headless Chromium (Debian: apt-get install chromium) at the widths
 # of a phone and of a desk: nothing asked of the network, no error told, nothing wider than its window.

@@ -130,7 +130,7 @@ def row(table: str, case: Case, results: list[dict[str, Any]]) -> str:
         return max(values, key=abs)
 
     for one in drawn:
-        if "stiffness" in one and case.arm == "ec66":
+        if "stiffness" in one:
             one["k_off"] = 100.0 * (one["stiffness"] / static(case) - 1.0)
     cells = [
         cell("contact", ".2f", min, 100.0),
@@ -147,7 +147,8 @@ def row(table: str, case: Case, results: list[dict[str, Any]]) -> str:
 
 def static(case: Case) -> float:
     """Stiffness of a row's pen as the set-points meet it, N/mm."""
-    return force_runs.effective(float(case.bench.get("stiffness", PEN)))
+    pen = float(case.bench.get("stiffness", PEN))
+    return force_runs.effective(pen, case.arm, case.bench.get("model", ""))
 
 
 def more(results: list[dict[str, Any]]) -> list[str]:

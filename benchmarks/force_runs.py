@@ -4,6 +4,7 @@ import contextlib
 import io
 import logging
 import tempfile
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ from dmpcli.bench import options
 from dmpcli.bench.workpiece import Flat, Round, Step
 from dmpcli.bench.world import World
 from dmpcli.control.execution import SENSOR_RATE
+from dmpcli.control.met_wall import MetWall
 from dmpcli.dmp import reference_paths
 from dmpcli.errors import DmpError
 from dmpcli.metrics.wave_height import stroke_wave
@@ -143,7 +145,9 @@ def measured(
     kept = ("stiffness", "delay", "wall", "zero_drift")
     found |= {key: told[key] for key in kept if key in told}
     if case.bench.get("surface") in ("wall", "slot"):
-        found["unavoidable"] = unavoidable(case, said, true)
+        wall = wall_met(case, said, true)
+        if wall is not None:
+            found |= {"unavoidable": wall.unavoidable, "true_wall": asdict(wall)}
     if case.leans and "friction" in told:
         found |= leaning(case, said, log) | {"friction": told["friction"]}
     # What a set-point says shows a look-ahead later.
@@ -236,26 +240,30 @@ def beyond(
     }
 
 
-def unavoidable(case: Case, said: dict[str, str], true: dict[str, Floats]) -> float:
-    """Force across the pen that a loop cannot avoid where it meets a wall, N; 0 where none is met.
+def wall_met(case: Case, said: dict[str, str], true: dict[str, Floats]) -> MetWall | None:
+    """What a wall makes of this arm, by what the bench is made of; None where none is met.
 
     The arm goes on at its speed into the wall, against its own stiffness in that direction, until
-    what was felt can show: a reading, a period, and the look-ahead of the arm.
+    what was felt can show: a reading, a period, and the look-ahead of the arm. The wall rubs too,
+    so that the arm bends by a force that leans from the wall's normal.
     """
-    across = np.hypot(true["fx"], true["fy"]) - 0.5 * np.abs(true["fz"])
-    hit = int(np.argmax(across > 2.0))
-    if not across[hit] > 2.0:
-        return 0.0
+    along = options.parameters(case.arm, said).workpiece.pose.rotation[:, 0]
+    force = np.column_stack([true[key] for key in ("fx", "fy", "fz")])
+    felt = -force @ along - 0.5 * np.abs(force[:, 2])
+    hit = int(np.argmax(felt > 2.0))
+    if not felt[hit] > 2.0:
+        return None
     tip = np.column_stack([true[key] for key in "xyz"])
     step = float(true["t"][1] - true["t"][0])
     before = max(hit - round(0.1 / step), 0)
-    velocity = (tip[hit] - tip[before]) / (step * max(hit - before, 1))
-    worst = int(np.argmax(np.hypot(true["fx"], true["fy"])))
-    wall = np.array([true["fx"][worst], true["fy"][worst], 0.0])
-    wall /= np.linalg.norm(wall)
+    speed = abs(float((tip[hit] - tip[before]) @ along)) / (step * max(hit - before, 1))
+    across = force * [1.0, 1.0, 0.0]
+    sizes = np.linalg.norm(across, axis=1)
+    worst = hit + int(np.argmax(sizes[hit:]))
     at = dict(zip("xyz", map(repr, tip[hit].tolist()), strict=True))
     compliance = World(options.parameters(case.arm, said | at)).compliance
-    return abs(float(velocity @ wall)) * reaction(said) / float(wall @ compliance @ wall)
+    stiffness = 1.0 / abs(float(along @ compliance @ across[worst]) / sizes[worst])
+    return MetWall(float(sizes[hit]), float(sizes[worst]), speed, stiffness, reaction(said))
 
 
 def reaction(said: dict[str, str]) -> float:
@@ -290,11 +298,12 @@ def onto(case: Case, said: dict[str, str], drawn: dmpcli.Trajectory) -> Floats |
 
 
 @lru_cache
-def effective(pen: float) -> float:
+def effective(pen: float, arm: str = "ec66", model: str = "") -> float:
     """Stiffness of a pen, contact and arm as the set-points meet it, N/mm: two depths, at rest."""
-    said = said_of(Case("", bench={"stiffness": repr(pen), "noise": "0"}), 0)
+    described = {"model": model} if model else {}
+    said = said_of(Case("", bench={"stiffness": repr(pen), "noise": "0"} | described), 0)
     said["z"] = repr(float(START[2]))
-    parameters = options.parameters("ec66", said)
+    parameters = options.parameters(arm, said)
     world, forces = World(parameters), []
     for depth in (0.5, 1.5):
         down = Pose(parameters.position - depth * UP, parameters.rotation)

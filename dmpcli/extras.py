@@ -76,6 +76,11 @@ BENCH = Extra(
     ("mujoco",),
     "`bench://` and `simulate --physics mujoco`, contact with physics",
 )
+MENAGERIE = Extra(
+    "menagerie",
+    ("mujoco-menagerie",),
+    "`bench://ur5e?model=menagerie`, an arm as the MuJoCo Menagerie describes it",
+)
 VIEW = Extra("view", ("k3d",), "`report --view`, a part that can be turned")
 FAST = Extra(
     "fast",
@@ -83,7 +88,7 @@ FAST = Extra(
     "`--kernels`, large tables on meshes in less than half the time",
     Wheels((3, 15), ("linux x86_64", "linux aarch64", "darwin arm64", "win32 AMD64")),
 )
-EXTRAS = (UR, DASK, SVG, ROS, BENCH, VIEW, FAST)
+EXTRAS = (UR, DASK, SVG, ROS, BENCH, MENAGERIE, VIEW, FAST)
 
 _MACHINES = {
     "linux x86_64": "Linux x86-64",

@@ -13,6 +13,7 @@ MODULES = {
     "svg": "svgelements",
     "ros": "rosbags",
     "bench": "mujoco",
+    "menagerie": "mujoco_menagerie",
     "view": "k3d",
     "fast": "numba",
 }

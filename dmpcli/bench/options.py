@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dmpcli.bench import scene
+from dmpcli.bench import description
+from dmpcli.bench.links import arms
 from dmpcli.bench.mesh_workpieces import COLLISIONS, read
 from dmpcli.bench.parameters import BenchParameters, JointServos, Pen, WristSensor
 from dmpcli.bench.workpiece import (
@@ -54,10 +55,10 @@ def agreed(address: Address, arm: str, said: dict[str, str]) -> str:
     InputError
         There is no such arm, or the two differ.
     """
-    if address.host not in scene.arms():
+    if address.host not in arms():
         raise InputError(
             f"{address}: the bench has no such arm; it is one of "
-            f"{', '.join(f'bench://{name}' for name in scene.arms())}"
+            f"{', '.join(f'bench://{name}' for name in arms())}"
         )
     if arm and arm != address.host:
         raise InputError(f"{address}: the other instrument is on bench://{arm}; name one arm")
@@ -116,9 +117,10 @@ def parameters(arm: str, said: dict[str, str]) -> BenchParameters:
         drift=np.concatenate([drift, np.zeros(3)]),
         latency=number("latency", 0.0, 0.0, 1.0, "s"),
     )
-    truth = options.text("truth")
+    truth, described = options.text("truth"), options.text("model")
     read_from = BenchParameters(
         arm=arm,
+        links=None if described is None else description.read(described, arm),
         position=position,
         rotation=rotation,
         tool=_tool(options, usual.tool),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.bench.links import Links
 from dmpcli.bench.workpiece import Flat, Workpiece
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN
 from dmpcli.spatial.wrench import Tool
@@ -109,6 +110,8 @@ class BenchParameters:
     ----------
     arm : str
         Name of a kinematic model (`dmpcli.kinematics.models`).
+    links : Links, optional
+        The arm as a file describes it. None: by the maker's kinematics and masses.
     position, rotation : array, shape (3,) and (3, 3)
         Where the TCP, the tip of the pen that nothing presses, stands at first; mm.
     tool : Tool
@@ -127,6 +130,7 @@ class BenchParameters:
     """
 
     arm: str = "ec66"
+    links: Links | None = None
     position: Floats = field(default_factory=lambda: np.array([-551.030, 131.399, -17.560]))
     rotation: Floats = field(default_factory=lambda: PEN_DOWN.copy())
     tool: Tool = field(default_factory=lambda: replace(PEN, zero=None))

@@ -9,10 +9,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.bench.links import Links
 from dmpcli.bench.parameters import BenchParameters
 from dmpcli.bench.workpiece import Traced
 from dmpcli.errors import InputError
-from dmpcli.kinematics.models import Arm
 from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp_one, to_quaternion
 from dmpcli.spatial.wrench import gravity
@@ -20,14 +20,6 @@ from dmpcli.spatial.wrench import gravity
 GRAVITY = 9.80665
 """m/s²."""
 
-# Of the links, kg: of EC66 as in the maker's ec66_description.urdf, of UR5e as in the maker's
-# support article on dynamics. Where the mass sits matters little: it is fed forward, and what gives
-# way under a load is the stiffness of the joints.
-_MASSES = {
-    "ec66": (1.783, 4.884, 2.150, 0.534, 0.534, 0.165),
-    "ur5e": (3.761, 8.058, 2.846, 1.37, 1.3, 0.365),
-}
-_THICK = 0.05  # m, radius of a link
 # A contact is a spring of MuJoCo's own, in series with the pen's, by the mass of what touches: at a
 # time constant of two steps and this impedance some 2000 N/mm. A harder one is no better: a tip of
 # 30 g that is out of contact for one step, as a facet ends, is thrown by a tenth of a millimetre.
@@ -37,21 +29,20 @@ _LEAST_MASS = 0.05  # kg, of what does not slide
 TRACED = "traced"
 """Body of the plane under the tip."""
 
+# MuJoCo's order of a symmetric matrix.
+_HALF = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
+
 JOINTS = tuple(f"joint{i}" for i in range(1, 7))
 
 
-def arms() -> list[str]:
-    """Return the names of the arms that can stand on the bench."""
-    return sorted(_MASSES)
-
-
-def build(parameters: BenchParameters, arm: Arm, mujoco: Any) -> Any:
+def build(parameters: BenchParameters, links: Links, mujoco: Any) -> Any:
     """Return the model, a ``mujoco.MjModel``.
 
     Parameters
     ----------
     parameters : BenchParameters
-    arm : Arm
+    links : Links
+        Of the arm.
     mujoco : module
 
     Raises
@@ -78,41 +69,33 @@ def build(parameters: BenchParameters, arm: Arm, mujoco: Any) -> Any:
         "condim": "1",
     }
     _add_workpiece(parameters, world, assets, contact)
-    _add_pen(parameters, _add_tool(parameters, _add_arm(parameters, arm, world)), contact)
+    _add_pen(parameters, _add_tool(parameters, _add_arm(parameters, links, world)), contact)
     sensors = ET.SubElement(root, "sensor")
     ET.SubElement(sensors, "force", site="wrist")
     ET.SubElement(sensors, "torque", site="wrist")
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
 
 
-def _add_arm(parameters: BenchParameters, arm: Arm, world: ET.Element) -> ET.Element:
+def _add_arm(parameters: BenchParameters, links: Links, world: ET.Element) -> ET.Element:
     """Hang six links one upon another; return the flange."""
-    parent = world
+    parent, arm = world, links.arm
     before = Pose(np.zeros(3), np.eye(3))
-    masses = _MASSES[arm.name]
+    rotors = parameters.servos.rotors if links.rotors is None else links.rotors
     for i, name in enumerate(JOINTS):
         turned = Pose(np.zeros(3), exp_one(np.array([0.0, 0.0, arm.offset[i]])))
         body = ET.SubElement(parent, "body", {"name": f"link{i + 1}", **_placed(before @ turned)})
         ET.SubElement(
-            body,
-            "joint",
-            name=name,
-            type="hinge",
-            axis="0 0 1",
-            armature=_text(parameters.servos.rotors[i]),
+            body, "joint", name=name, type="hinge", axis="0 0 1", armature=_text(rotors[i])
         )
         before = Pose(
             np.array([arm.a[i], 0.0, arm.d[i]]), exp_one(np.array([arm.alpha[i], 0.0, 0.0]))
         )
-        end = before.position / 1e3
-        length = max(float(np.linalg.norm(end)), _THICK)
-        about = masses[i] * (length**2 / 12.0 + _THICK**2 / 4.0)
         ET.SubElement(
             body,
             "inertial",
-            pos=_text(0.5 * end),
-            mass=_text(masses[i]),
-            diaginertia=_text([about] * 3),
+            pos=_text(links.centre[i]),
+            mass=_text(links.mass[i]),
+            fullinertia=_text(links.inertia[i][_HALF]),
         )
         parent = body
     return ET.SubElement(parent, "body", {"name": "flange", **_placed(before)})

@@ -15,12 +15,12 @@ from dmpcli.admittance.compensation import Compensation
 from dmpcli.arrays import Floats
 from dmpcli.bench import scene
 from dmpcli.bench.joint_servos import JointReference
+from dmpcli.bench.links import arms, published
 from dmpcli.bench.parameters import FASTEST, BenchParameters
 from dmpcli.bench.truth import Truth
 from dmpcli.bench.workpiece import Traced
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics import chain, inverse
-from dmpcli.kinematics.models import model
 from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import to_quaternion
 
@@ -53,6 +53,8 @@ class World:
     Attributes
     ----------
     parameters : BenchParameters
+    links : Links
+        What the arm weighs.
     arm : Arm
         Its kinematics.
     t : float
@@ -82,10 +84,11 @@ class World:
                 f"rattle by itself; take at most {FASTEST / parameters.pen.pace:.2g} s"
             )
         (self._mujoco,) = extras.load(extras.BENCH, "bench", "mujoco")
-        if parameters.arm not in scene.arms():
-            raise InputError(f"bench: no arm {parameters.arm!r}; it has {', '.join(scene.arms())}")
-        self.arm = model(parameters.arm)
-        self._model = scene.build(parameters, self.arm, self._mujoco)
+        if parameters.arm not in arms():
+            raise InputError(f"bench: no arm {parameters.arm!r}; it has {', '.join(arms())}")
+        self.links = parameters.links or published(parameters.arm)
+        self.arm = self.links.arm
+        self._model = scene.build(parameters, self.links, self._mujoco)
         self._data = self._mujoco.MjData(self._model)
         self._steps = 0
         joints = self.joints_of(Pose(parameters.position, parameters.rotation), self._ready())

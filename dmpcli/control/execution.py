@@ -175,7 +175,7 @@ def reach_of(robot: Servo, model: str | None, tool: Tool | None) -> Reach | None
     own: Reach | None = getattr(robot, "reach", None)  # a servo that is driven by poses has none
     if model is None or own is None:
         return own if model is None else Reach(models.model(model), tool)
-    if own.arm is not models.model(model):
+    if own.arm.name != models.model(model).name:
         raise InputError(f"--robot-model {model}: the robot is an {own.arm.name}; leave it out")
     return own
 

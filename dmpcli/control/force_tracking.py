@@ -1,6 +1,5 @@
 """What the loop feels: the sensor's wrench, and the force coupling that presses with it."""
 
-import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -17,7 +16,7 @@ from dmpcli.control.contact_supervisor import ContactSupervisor
 from dmpcli.control.contact_tally import ContactTally
 from dmpcli.control.coupled_plan import lifts, setpoints
 from dmpcli.control.force_sensing import Sensing
-from dmpcli.control.met_wall import MetWall, against, met
+from dmpcli.control.met_wall import MetWall, against, met, resisting
 from dmpcli.control.normal_sensing import NormalPolicy, NormalSense
 from dmpcli.instruments.protocols import RobotState, Sample
 from dmpcli.planning.plan import Plan
@@ -161,14 +160,22 @@ class ForceTracker:
         # displaced along the planned one, so that it draws the plan carried along its normals.
         normal = x, y, z = self.sense.normal(planned)
         force = dot(felt, normal)
-        side = math.hypot(fx - force * x, fy - force * y, fz - force * z)
-        supervisor.step(t, force, side, wanted, self.sense.friction)
+        friction = self.sense.friction
+        side = (fx - force * x, fy - force * y, fz - force * z)
+        resists = resisting(side, self._way(index), friction * force)
+        supervisor.step(t, force, resists, wanted, friction)
         if index > plan.lead and wanted > 0.0:
             touching = force > min(supervisor.policy.contact, wanted / 2.0)
             self.tally.add(force, wanted, touching and not supervisor.doubted, supervisor.saturated)
         self._delta = force_coupling.follow(self._filter, self._delta, supervisor.e)
         moved: Floats = self._delta[0] * across
         return moved
+
+    def _way(self, index: float) -> Vector:
+        """From the set-point before to this one, mm."""
+        plan = self._plan
+        number = min(round(index), len(plan) - 1)
+        return _vector(plan.position[number] - plan.position[max(number - 1, 0)])
 
     def look_back(
         self, index: float, readings: Sequence[tuple[float, Floats]], between: float
@@ -191,8 +198,8 @@ class ForceTracker:
         normal = np.array(self.sense.normal(_vector(plan.normal_at(index))))
         zero = plan.rotation[number] @ self._zero
         felt = [(t, wrench[:3] - zero) for t, wrench in readings]
-        step = plan.position[number] - plan.position[max(number - 1, 0)]
-        series, speed = against(felt, normal, step / plan.period)
+        velocity = np.array(self._way(index)) / plan.period
+        series, speed = against(felt, normal, velocity, self.sense.friction)
         reaction = supervisor.reaction + between
         self.wall = met(supervisor.across, series, speed, reaction, plan.period)
         if self.wall is not None:

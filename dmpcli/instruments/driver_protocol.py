@@ -12,6 +12,8 @@ from typing import Literal, Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
 from dmpcli.instruments.protocols import Controlled, RobotMode, ServoInfo
+from dmpcli.kinematics import models
+from dmpcli.kinematics.models import Arm
 
 Space = Literal["joint", "pose"]
 """What a set-point is: joint angles, or a pose of the TCP."""
@@ -35,8 +37,9 @@ class DriverInfo(ServoInfo):
         Units of its set-points and states.
     orientation : str
         Form of its poses.
-    model : str or None
-        Name of the kinematic model (`dmpcli.kinematics.models`), which ``joint`` needs.
+    model : str or Arm or None
+        Name of the kinematic model (`dmpcli.kinematics.models`), which ``joint`` needs; or the
+        model itself, of a controller that knows its arm's own lengths.
     base_turn, flange_turn : float
         By how much the controller's base and flange frames are turned about z against those of the
         model, rad.
@@ -52,12 +55,23 @@ class DriverInfo(ServoInfo):
     length: LengthUnit
     angle: AngleUnit
     orientation: Orientation
-    model: str | None = None
+    model: str | Arm | None = None
     base_turn: float = 0.0
     flange_turn: float = 0.0
     tolerance: tuple[float, float] = (2.0, 0.02)
     remedy: str = ""
     pacing: InitVar[str | None] = None
+
+    @property
+    def arm(self) -> Arm | None:
+        """The kinematic model.
+
+        Raises
+        ------
+        InputError
+            There is none of that name.
+        """
+        return models.model(self.model) if isinstance(self.model, str) else self.model
 
 
 @dataclass(frozen=True)

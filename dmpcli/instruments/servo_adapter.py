@@ -23,7 +23,6 @@ from dmpcli.instruments.driver_protocol import (
 )
 from dmpcli.instruments.joint_space import JointSpace
 from dmpcli.instruments.protocols import Clock, RobotState, ServoInfo
-from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
@@ -75,9 +74,8 @@ class PoseServo:
     def _by_model(self) -> JointSpace | None:
         """The kinematics of the model that the driver names, whatever it is driven by."""
         declared = self._declared
-        if declared.model is None:
-            return None
-        return JointSpace(models.model(declared.model), declared, self._tool)
+        arm = declared.arm
+        return None if arm is None else JointSpace(arm, declared, self._tool)
 
     @property
     def reach(self) -> Reach | None:
@@ -87,9 +85,9 @@ class PoseServo:
         known here otherwise.
         """
         declared = self._declared
-        if declared.model is None or (declared.space == "pose" and self._tool is None):
+        arm = declared.arm
+        if arm is None or (declared.space == "pose" and self._tool is None):
             return None
-        arm = models.model(declared.model)
         return Reach(arm, self._tool, declared.base_turn, declared.flange_turn)
 
     def state(self) -> RobotState:
@@ -319,6 +317,6 @@ def servo(driver: ServoDriver, clock: Clock, tool: Tool | None = None) -> PoseSe
 def _joint_space(declared: DriverInfo, tool: Tool | None) -> JointSpace | None:
     if declared.space == "pose":
         return None
-    if declared.model is None:
+    if declared.arm is None:
         raise InputError(f"robot: {declared.make} is driven by joints, and its driver has no model")
-    return JointSpace(models.model(declared.model), declared, tool)
+    return JointSpace(declared.arm, declared, tool)

@@ -8,6 +8,7 @@ import pytest
 from dmpcli.admittance.compensation import Compensation
 from dmpcli.bench.parameters import BenchParameters, Pen, WristSensor
 from dmpcli.bench.workpiece import Edge, Flat, Nothing, Ramp, Round, Slot, Step, Traced, moved
+from dmpcli.control.met_wall import against, met
 from dmpcli.extras import BENCH
 from dmpcli.simulation.mock import PEN
 from dmpcli.spatial import wrench
@@ -215,6 +216,25 @@ def test_at_a_wall_the_force_grows_by_the_arms_stiffness_across():
     slope = (pressed[-1] - pressed[0]) / 199.0 * 1e3 / 5.0
     arm = 1.0 / bench.compliance[0, 0]
     assert -slope == pytest.approx(arm, rel=0.25)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_the_unavoidable_force_is_what_an_arm_that_does_nothing_makes_of_the_wall(friction):
+    """Slanting into it: by readings of a few cycles, of the slope that goes on after them."""
+    bench = world(Step(FRAME, 5.0, 3.0), pen=Pen(friction=friction))
+    press(bench, 2.0)
+    forces, _ = slide(bench, 2.0, 24.0, 0.6, direction=(0.8, 0.6))
+    hit = int(np.argmax(forces[:, 0] < -3.0))
+    later = np.linalg.norm(forces[hit + 50 :][:150, :2], axis=1)
+    slope = np.polyfit(1e-3 * np.arange(150), later, 1)[0]
+    readings = [(1e-3 * n, forces[n]) for n in range(hit - 23, hit + 30, 10)]
+    series, speed = against(
+        readings, np.array([0.0, 0.0, 1.0]), np.array([19.2, 14.4, 0.0]), friction
+    )
+    wall = met(10.0, series, speed, 0.075, PERIOD)
+    assert wall.speed == pytest.approx(19.2, rel=0.03)
+    assert wall.unavoidable == pytest.approx(0.075 * slope, rel=0.1)
+    assert wall.stiffness == pytest.approx(slope / 19.2, rel=0.1)
 
 
 def test_step_leads_the_tool_and_tells_what_is_felt():

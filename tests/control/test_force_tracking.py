@@ -292,7 +292,7 @@ def test_force_is_that_along_the_normal_and_the_rest_is_across_it():
     press = pressing((0.6, 0.0, 0.8))
     felt = []
     press.supervisor.step = lambda *said: felt.append(said)
-    press.displace(100.0, np.array([3.0, 4.0, 5.0, 9.0, 9.0, 9.0]), 2.0)
+    press.displace(100.0, np.array([3.96, -4.0, 4.28, 9.0, 9.0, 9.0]), 2.0)  # against the way
     [(t, force, across, wanted, friction)] = felt
     assert (t, force, wanted) == (2.0, pytest.approx(5.8), 3.0)
     assert across == pytest.approx(np.sqrt(50.0 - 5.8**2))
@@ -429,6 +429,18 @@ def test_a_wall_is_what_rises_across_the_normal_as_fast_as_the_stroke_runs_into_
     before = press.wall
     press.look_back(200.0, readings, 0.01)
     assert press.wall is before
+
+
+@pytest.mark.parametrize(("helps", "ends"), [(False, True), (True, False)])
+def test_a_force_across_the_normal_ends_a_stroke_where_it_resists_alone(helps, ends):
+    """Twice what friction may be: a wall against the way, or an edge that lets the tool go."""
+    press, made = pressing(), plan(stroke(normal=UP))
+    press.supervisor.state = "drawing"
+    way = made.position[120] - made.position[119]
+    side = (1.0 if helps else -1.0) * 8.0 * way / np.linalg.norm(way)
+    press.displace(120.0, np.append(side + 5.0 * np.array(UP), np.zeros(3)), 2.4)
+    assert (press.supervisor.across is not None) == ends
+    assert bool(press.failure) == ends
 
 
 def test_how_far_the_zero_has_moved_is_told_in_the_tools_axes_once_it_is_clear():
