@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.control import execution, workcell
+from dmpcli.control import execution, force_execution, workcell
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.drag_loop import Recorder
 from dmpcli.control.loop_timing import LoopTiming
@@ -157,7 +157,7 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     start = stroke.position[0], here.rotation
     plan = planning.make(stroke, period, 1.0, limits_of(settings), start, 20.0)
     watch = StopLimits(100.0, 1.0, 1e3, 1e3)
-    touch = execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
+    touch = force_execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
     loop = ServoLoop(plan, limits_of(settings), watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))

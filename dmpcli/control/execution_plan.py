@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmpcli.control import execution, guards
 from dmpcli.control.cycle import ReadyArm
 from dmpcli.errors import InputError, RefusedError
-from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import transfers
 from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan
@@ -18,6 +17,9 @@ from dmpcli.planning.transfers import TransferOptions
 from dmpcli.records.stroke_selection import StrokeSelection, listed
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.trajectory import StrokeTrajectory
+
+if TYPE_CHECKING:
+    from dmpcli.kinematics.reachability import Reach
 
 CLEARANCE = 20.0
 """Distance from the work in the air where none is given, mm."""
@@ -94,7 +96,7 @@ def prepare(
     arm: ReadyArm,
     presses: bool,
     advance: Callable[[int], None],
-    reach: Reach | None = None,
+    reach: "Reach | None" = None,
 ) -> list[CheckedPlan]:
     """Plan all strokes from where the arm stands, and judge each with the ways to it and off it.
 

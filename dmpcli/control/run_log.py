@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
 from dmpcli.records.schemas import (
     EULER_ANGLES,
@@ -210,6 +209,8 @@ def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict
     options : mapping
         Of its provenance; the servo period.
     """
+    from dmpcli.metrics.timing import punctuality
+
     found = punctuality(known["deadline"], known["lateness"], float(options["period"]))
     late = {"p50": found.median, "p99": found.p99, "max": found.worst}
     ended = {"reason": RECOVERED, "completed": False}

@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from dmpcli.arrays import Floats
 from dmpcli.control.arrival import ArrivalMonitor
@@ -20,8 +20,6 @@ from dmpcli.control.cycle import (
     StopLimits,
     StoppedAtOnce,
 )
-from dmpcli.control.force_tracking import ForceInput, ForceTracker
-from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.guards import LAG
 from dmpcli.control.outputs import OutputSwitch, failed
 from dmpcli.control.plan_cursor import PlanCursor
@@ -33,6 +31,10 @@ from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan
 from dmpcli.spatial.pose import Pose
+
+if TYPE_CHECKING:  # neither is loaded where neither is asked for
+    from dmpcli.control.force_tracking import ForceInput, ForceTracker
+    from dmpcli.control.goal_following import GoalFollower
 
 DONE = "done"
 
@@ -92,11 +94,11 @@ class PlanLoop(ControlLoop):
         limits: Limits,
         watch: StopLimits,
         arm: ReadyArm,
-        touch: ForceInput | None = None,
+        touch: "ForceInput | None" = None,
         hindrance: Callable[[], DmpError | None] = lambda: None,
         then: Sequence[Plan] = (),
         outputs: OutputSwitch | None = None,
-        goals: GoalFollower | None = None,
+        goals: "GoalFollower | None" = None,
     ) -> None:
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
@@ -389,7 +391,7 @@ class ServoLoop(PlanLoop):
         self._steps.check(self._last, setpoint)
         return setpoint
 
-    def _pressed(self, pressing: ForceTracker, cycle: Cycle, index: float) -> Floats:
+    def _pressed(self, pressing: "ForceTracker", cycle: Cycle, index: float) -> Floats:
         """Return what the force coupling adds to the set-point, shape (3,), mm."""
         plan, cursor, t = self.plan, self._cursor, cycle.due
         if cursor.braking:

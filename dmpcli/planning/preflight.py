@@ -1,17 +1,20 @@
 """What can be judged before an arm moves, on arrays alone."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import beside
-from dmpcli.kinematics.path import Followed, Peak
-from dmpcli.kinematics.reachability import Reach, singular
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan
 from dmpcli.spatial import rotations
 from dmpcli.spatial.trajectory import StrokeTrajectory
+
+if TYPE_CHECKING:  # loaded where an arm's joints are judged
+    from dmpcli.kinematics.path import Followed, Peak
+    from dmpcli.kinematics.reachability import Reach
 
 # A stroke that begins or ends slower than this share of the acceleration limit times the servo
 # period is at rest, 9 mm/s and 0.06 rad/s by default: the arm takes up such a step in velocity
@@ -174,7 +177,7 @@ def within_limits(plan: Plan, stroke: StrokeTrajectory, limits: Limits) -> list[
 
 
 def by_joints(
-    plan: Plan, stroke: StrokeTrajectory, reach: Reach, start: Floats | None
+    plan: Plan, stroke: StrokeTrajectory, reach: "Reach", start: Floats | None
 ) -> tuple[list[Check], Floats | None]:
     """Reach, joint angles and joint speeds of a plan; an arm that misses a pose has no others.
 
@@ -198,8 +201,8 @@ def by_joints(
     return _by_joints(plan, stroke, followed), after
 
 
-def _by_joints(plan: Plan, stroke: StrokeTrajectory, followed: Followed) -> list[Check]:
-    def check(quantity: str, unit: str, peak: Peak, remedy: str) -> Check:
+def _by_joints(plan: Plan, stroke: StrokeTrajectory, followed: "Followed") -> list[Check]:
+    def check(quantity: str, unit: str, peak: "Peak", remedy: str) -> Check:
         value, limit = float(peak.value[0]), float(peak.limit[0])
         if unit != "mm":
             value, limit = float(np.degrees(value)), float(np.degrees(limit))
@@ -211,6 +214,8 @@ def _by_joints(plan: Plan, stroke: StrokeTrajectory, followed: Followed) -> list
     if not reach.passed:
         return [reach]
     angle, speed = followed.angle, followed.speed
+    from dmpcli.kinematics.reachability import singular
+
     near = "".join(f"it is {clause}; " for clause in singular(followed.nearness[0]))
     if followed.jumps[0]:
         slower = "no --speed helps, for it jumps: "

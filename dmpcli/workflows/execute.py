@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dmpcli.admittance.force_coupling import Filter
 from dmpcli.control import (
     execution,
     execution_plan,
@@ -19,13 +18,11 @@ from dmpcli.control import (
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
 from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer
-from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
 from dmpcli.records import file_io, stroke_selection, suffixes, tolerance_mark
@@ -43,6 +40,11 @@ from dmpcli.workflows.run_output import (
     refuse_replacing,
 )
 from dmpcli.workflows.told_later import LaterTeller
+
+if TYPE_CHECKING:  # loaded where it is asked for
+    from dmpcli.admittance.force_coupling import Filter
+    from dmpcli.control.goal_following import GoalFollower
+    from dmpcli.kinematics.reachability import Reach
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,11 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
     scene = execution.scene(first, request.presses, above)
     weight = (held or scene.tool).weight
-    coupling = execution.coupling_of(batch, settings, weight) if request.presses else None
+    coupling = None
+    if request.presses:
+        from dmpcli.control import force_execution
+
+        coupling = force_execution.coupling_of(batch, settings, weight)
     realtime = request.realtime or not repeatable
     clock = clocks.MonotonicClock() if realtime else clocks.SimulatedClock()
     keeper = None
@@ -210,7 +216,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
-        if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
+        if coupling is not None and (late := force_execution.slowed(arm.info.lookahead)):
             warn(late)
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
@@ -257,7 +263,9 @@ def _tell_of(loop: PlanLoop, realtime: bool) -> None:
     if realtime:
         tell(str(loop.timing))
     if loop.pressing is not None:
-        tell(execution.pressed(loop.pressing))
+        from dmpcli.control import force_execution
+
+        tell(force_execution.pressed(loop.pressing))
     if loop.goals is not None:
         tell(loop.goals.said())
 
@@ -294,7 +302,7 @@ def _judged(
     batch: StrokeSelection,
     settings: ExecuteSettings,
     arm: ReadyArm,
-    reach: Reach | None,
+    reach: "Reach | None",
     request: ExecutionRequest,
 ) -> list[CheckedPlan]:
     """Plan and check every stroke from where the arm stands."""
@@ -333,23 +341,25 @@ def _loop(
     judged: list[CheckedPlan],
     settings: ExecuteSettings,
     request: ExecutionRequest,
-    coupling: Filter | None,
+    coupling: "Filter | None",
     tool_file: Source | None,
     keeper: RunOutput,
     batch: StrokeSelection,
     teller: LaterTeller,
-    goals: GoalFollower | None,
+    goals: "GoalFollower | None",
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
+        from dmpcli.control import force_execution
+
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
         policy = None
         if coupling is not None:
-            policy = execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
-        touch = execution.touch(
+            policy = force_execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
+        touch = force_execution.touch(
             bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )
     watch = execution.watch(settings)
@@ -410,7 +420,7 @@ def _stream(
     provenance: Provenance,
     realtime: bool,
     keeper: RunOutput,
-    reach: Reach | None,
+    reach: "Reach | None",
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None
