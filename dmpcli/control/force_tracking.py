@@ -153,7 +153,10 @@ class ForceTracker:
             fx, fy, fz = felt = fx - zx, fy - zy, fz - zz
         wanted = self.wanted(index)
         if position is not None and index > plan.lead and supervisor.state == "drawing":
-            self.sense.feel(t, felt, _vector(position), planned)
+            # Where the surface is: as the force that is asked for changes, the tool's spring does.
+            k = supervisor.stiffness
+            pushed = (0.0 if k is None else wanted / k) * across
+            self.sense.feel(t, felt, _vector(position + pushed), planned)
         else:
             self.sense.lift()
         # The force is held along the surface's own normal, where that is asked for; the tool is

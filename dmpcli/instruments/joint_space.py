@@ -133,7 +133,7 @@ class JointSpace:
         raise RefusedError(
             f"robot: by its joints the TCP is at {_words(ours)}, by its controller at "
             f"{_words(theirs)}: {distance:.1f} mm and {np.degrees(angle):.1f}° apart; "
-            f"{self._cause(joints, reported)}{self._declared.remedy}"
+            f"{self._cause(joints, reported)}{self._remedy}"
         )
 
     def check_inverse(
@@ -170,8 +170,14 @@ class JointSpace:
                 raise RefusedError(
                     f"robot: its inverse kinematics and ours differ at {_words(goal)}: by "
                     f"{distance:.1f} mm, {np.degrees(angle):.1f}° and {np.degrees(away):.1f}° in "
-                    f"a joint; {self._declared.make} may not be this arm{self._declared.remedy}"
+                    f"a joint; {self._declared.make} may not be this arm{self._remedy}"
                 )
+
+    @property
+    def _remedy(self) -> str:
+        """What the driver advises, set off from what was said before."""
+        advice = self._declared.remedy.lstrip("; ")
+        return f"; {advice}" if advice else ""
 
     def _cause(self, joints: Floats, reported: Floats) -> str:
         """Name what would explain the difference, tried out; else what usually does."""

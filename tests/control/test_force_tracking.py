@@ -431,6 +431,20 @@ def test_a_wall_is_what_rises_across_the_normal_as_fast_as_the_stroke_runs_into_
     assert press.wall is before
 
 
+def test_a_spring_that_is_pressed_harder_along_the_stroke_leans_no_surface():
+    """The tool goes deeper by what its spring gives; the surface is where it was."""
+    press, made = pressing(), plan(stroke(normal=UP))
+    supervisor = press.supervisor
+    supervisor.state, supervisor.stiffness = "drawing", 0.8
+    press._wanted = np.linspace(2.0, 8.0, len(made))
+    felt = []
+    press.sense.feel = lambda t, force, position, planned: felt.append(position)
+    for index in (100, 180, 260):
+        deep = made.position[index] - press.wanted(index) / 0.8 * np.array(UP)
+        press.displace(float(index), np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0]), 2.0, deep)
+    np.testing.assert_allclose(felt, made.position[[100, 180, 260]], atol=1e-9)
+
+
 @pytest.mark.parametrize(("helps", "ends"), [(False, True), (True, False)])
 def test_a_force_across_the_normal_ends_a_stroke_where_it_resists_alone(helps, ends):
     """Twice what friction may be: a wall against the way, or an edge that lets the tool go."""

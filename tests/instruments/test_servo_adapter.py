@@ -10,6 +10,7 @@ from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments import pose_forms, servo_adapter
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.driver_protocol import DriverInfo, DriverState
+from dmpcli.instruments.joint_space import JointSpace
 from dmpcli.instruments.protocols import ServoInfo
 from dmpcli.kinematics import chain, inverse, models
 from dmpcli.simulation.mock import PEN
@@ -376,3 +377,14 @@ def test_a_whole_plan_is_handed_over_in_the_drivers_units():
 
 def test_only_a_driver_that_plays_plans_makes_a_servo_that_does():
     assert not hasattr(opened(Brand()), "upload")
+
+
+@pytest.mark.parametrize("remedy", ["see tool=N", "; see tool=N", ""])
+def test_what_the_driver_advises_is_set_off_from_what_is_wrong(remedy):
+    space = JointSpace(ARM, declared(angle="rad", remedy=remedy), None)
+    there, rotation = space.tcp(HOME)
+    said = np.concatenate([there + [9.0, 0.0, 0.0], by_scipy(declared(angle="rad"), rotation)])
+    with pytest.raises(RefusedError) as refused:
+        space.check(HOME, said)
+    ending = str(refused.value).split("Euler angles differ")[1]
+    assert ending == ("; see tool=N" if remedy else "")
