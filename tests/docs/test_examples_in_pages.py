@@ -203,6 +203,7 @@ def test_python_that_runs_elsewhere_is_taken_from_the_page_there():
         assert "exec(" in text or "write_text(" in text, file
 
 
+@pytest.mark.slow
 def test_every_fence_is_run_or_shows_what_the_program_says():
     """Commands stand in fences of sh, and are run; in those of text, what the program says."""
     whole = "\n".join(texts())
@@ -244,6 +245,7 @@ def test_commands_of_pages_that_take_long_are_understood():
             assert re.search(rf"\b{name}\b", rules) if value else name in phony, line
 
 
+@pytest.mark.slow
 def test_modules_that_pages_run_are_there_and_take_their_words():
     for page in STANDING:
         text = page.read_text()
