@@ -14,14 +14,13 @@ import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 import pytest
 
 from dmpcli.commands.examples import ROBOT, SENSOR
 from tests.commands.running import ended, invoke
-from tests.commands.test_examples import cell, lay_out
+from tests.commands.test_examples import lay_out, real_cell
 from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.docs.pages import ELSEWHERE, PAGES, ROOT, blocks, lines, name_of
 from tests.docs.test_pages import texts
@@ -165,10 +164,7 @@ def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):
             for name, value in store.environment.items():
                 monkeypatch.setenv(name, value)
         if any(robot in line for line in typed):
-            stack.enter_context(cell().laid_out())
-            for module in ("control.watchdog", "workflows.record"):
-                target = f"dmpcli.{module}.watched"
-                stack.enter_context(mock.patch(target, lambda servo: servo))
+            stack.enter_context(real_cell())
         for line in typed:
             run(line, variables)
 
