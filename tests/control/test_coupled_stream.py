@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -64,6 +65,7 @@ def drawn(force, over, coupled=True, duration=3.0, **policy):
     return made, loop, np.array([position for position, _ in servo.sent])
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(st.floats(0.5, 20.0), st.floats(0.03, 0.2), st.sampled_from([2.5, 4.0]))
 def test_where_e_is_0_the_coupled_stream_is_the_plain_one(k, delay, duration):
@@ -79,6 +81,7 @@ def test_where_e_is_0_the_coupled_stream_is_the_plain_one(k, delay, duration):
     assert set(loop.log.columns()["contact"]) <= {"free", "retreating", None}
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.floats(1.2, 10.0), st.floats(0.05, 0.15), st.floats(-4.0, 4.0))
 def test_after_contact_has_ended_the_offset_decays_and_the_goal_is_reached(k, delay, over):

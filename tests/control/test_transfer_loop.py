@@ -78,6 +78,7 @@ def test_rows_tell_phase_and_stroke():
     assert all(name is None for name in columns["id"][~drawing])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "phase", "drawn"),
     [
