@@ -382,8 +382,9 @@ def test_only_a_driver_that_plays_plans_makes_a_servo_that_does():
 @pytest.mark.parametrize("remedy", ["see tool=N", "; see tool=N", ""])
 def test_what_the_driver_advises_is_set_off_from_what_is_wrong(remedy):
     space = JointSpace(ARM, declared(angle="rad", remedy=remedy), None)
-    there, rotation = space.tcp(HOME)
-    said = np.concatenate([there + [9.0, 0.0, 0.0], by_scipy(declared(angle="rad"), rotation)])
+    tcp = space.tcp(HOME)
+    turn = by_scipy(declared(angle="rad"), tcp.rotation)
+    said = np.concatenate([tcp.position + [9.0, 0.0, 0.0], turn])
     with pytest.raises(RefusedError) as refused:
         space.check(HOME, said)
     ending = str(refused.value).split("Euler angles differ")[1]
