@@ -29,7 +29,7 @@ import numpy as np
 
 from benchmarks import force_runs, force_stability, force_work
 from benchmarks.force_cases import PEN, ROOT, TABLES, Case
-from dmpcli.control.execution import DRIFTED
+from dmpcli.control.force_execution import DRIFTED
 
 KEPT = ROOT / "out" / "force-runs.jsonl"
 _SAID = 72  # of why a run ended, characters

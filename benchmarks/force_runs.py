@@ -33,7 +33,7 @@ from dmpcli.arrays import Floats
 from dmpcli.bench import options
 from dmpcli.bench.workpiece import Flat, Round, Step
 from dmpcli.bench.world import World
-from dmpcli.control.execution import SENSOR_RATE
+from dmpcli.control.force_execution import SENSOR_RATE
 from dmpcli.control.met_wall import MetWall
 from dmpcli.dmp import reference_paths
 from dmpcli.errors import DmpError

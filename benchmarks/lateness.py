@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.control import execution, workcell
+from dmpcli.control import execution, force_execution, workcell
 from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.drag_loop import Recorder
 from dmpcli.control.loop_timing import LoopTiming
@@ -42,6 +42,7 @@ from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.settings.record import RecordSettings
 from dmpcli.simulation import reference_strokes, rehearsal
 from dmpcli.simulation.mock import PEN, Scene
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from dmpcli.spatial.wrench import Tool
 
 BLOCKS = 3
@@ -145,7 +146,7 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     # There and back: the next block begins where this one did.
     away = np.sin(np.pi * u) ** 2
     wave = np.column_stack([-109.0 * away, 25.0 * np.sin(2.0 * np.pi * u), 0.0 * u])
-    stroke = planning.PlannedStroke("0", t, np.array([-551.03, 131.4, -17.56]) + wave, None)
+    stroke = StrokeTrajectory(t, np.array([-551.03, 131.4, -17.56]) + wave, None, id="0")
     clock = Metered()
     bench = at.connect(clock, execution.scene(stroke, presses=False))
     servo = watched(bench.robot)
@@ -156,7 +157,7 @@ def executing(period: float, duration: float, folder: Path, at: Place) -> Measur
     start = stroke.position[0], here.rotation
     plan = planning.make(stroke, period, 1.0, limits_of(settings), start, 20.0)
     watch = StopLimits(100.0, 1.0, 1e3, 1e3)
-    touch = execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
+    touch = force_execution.touch(bench.sensor, at.tool, plan, settings, arm, None)
     loop = ServoLoop(plan, limits_of(settings), watch, arm, touch)
     path = folder / "execute.journal"
     journal = Journal(path, loop.log.rows, schemas.RUN, Provenance("execute"))

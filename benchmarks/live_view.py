@@ -1,6 +1,6 @@
 """How much later the loops of `record` and `execute` wake while somebody watches.
 
-    python -m benchmarks.live_view [--block 30] [--rates 50 250]
+    python -m benchmarks.live_view [--block 30] [--blocks 5] [--rates 50 250]
 
 Blocks with and without the live view take turns; the view draws on a pseudo-terminal that a process
 of its own reads. Each block has a p99 of its waking; the median of the blocks with the view may be
@@ -31,7 +31,6 @@ from dmpcli.control.servo_loop import PlanLoop
 from dmpcli.errors import DmpError
 from dmpcli.simulation.mock import PEN
 
-BLOCKS = 5
 STEP = 2e-5
 
 
@@ -74,6 +73,7 @@ def main() -> int:
     """Print the figures; 1 where one is missed."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--block", type=float, default=30.0, metavar="S")
+    options.add_argument("--blocks", type=int, default=5, metavar="N", help="of each kind")
     options.add_argument("--rates", type=float, nargs="+", default=[50.0, 250.0], metavar="HZ")
     given = options.parse_args()
     at, passed = Place(ROBOT, "mock:", PEN), True
@@ -81,7 +81,7 @@ def main() -> int:
         for rate in given.rates:
             for command, ours in (("record", recording), ("execute", executing)):
                 runs: dict[bool, list[Measured]] = {False: [], True: []}
-                for block in range(2 * BLOCKS):
+                for block in range(2 * given.blocks):
                     seen = block % 2 == 1
                     with viewed() if seen else contextlib.nullcontext():
                         runs[seen].append(ours(1.0 / rate, given.block, Path(name), at))
@@ -95,7 +95,7 @@ def _woke(runs: list[Measured]) -> list[Floats]:
 
 
 def _judge(what: str, alone: list[Floats], watched: list[Floats]) -> bool:
-    print(f"{what}, {2 * BLOCKS} blocks")
+    print(f"{what}, {len(alone)} blocks of each")
     p99 = {}
     for name, blocks in (("alone", alone), ("watched", watched)):
         each = np.array([np.quantile(late, 0.99) for late in blocks])
@@ -108,7 +108,7 @@ def _judge(what: str, alone: list[Floats], watched: list[Floats]) -> bool:
         )
     before, after = p99["alone"], p99["watched"]
     good = after <= max(1.1 * before, before + STEP)
-    print(f"  p99 {100 * (after / before - 1):+.1f} %: {'yes' if good else 'NO'}")
+    print(f"  p99 {100 * (after / before - 1):+.1f} %: {'yes' if good else 'NO'}", flush=True)
     return good
 
 

@@ -21,6 +21,17 @@ FIRST = tuple(
 """What waits or takes long in one file: begun last, it would leave other cores idle at the end."""
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect without looking for garbage, there is none; nor look at what was collected later."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
 

@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from moto.server import DomainDispatcherApplication, create_backend_app
-from werkzeug.serving import WSGIRequestHandler, make_server
 
 BUCKET = "strokes"
 SECRETS = {"AWS_ACCESS_KEY_ID": "AKIANOBODYSKEY00", "AWS_SECRET_ACCESS_KEY": "no/bodys+secret=00"}
@@ -113,14 +111,17 @@ class Store:
         return found
 
 
-class _Quiet(WSGIRequestHandler):
-    def log(self, type: str, message: str, *args: Any) -> None:  # noqa: A002
-        """Say nothing."""
-
-
 @contextlib.contextmanager
 def served() -> Iterator[Store]:
     """Run a server with one empty bucket, `BUCKET`."""
+    # Loaded where a server runs: every process collects these tests, and few run one.
+    from moto.server import DomainDispatcherApplication, create_backend_app
+    from werkzeug.serving import WSGIRequestHandler, make_server
+
+    class Quiet(WSGIRequestHandler):
+        def log(self, type: str, message: str, *args: Any) -> None:  # noqa: A002
+            """Say nothing."""
+
     inner = DomainDispatcherApplication(create_backend_app)
     store = Store("")
 
@@ -142,7 +143,7 @@ def served() -> Iterator[Store]:
         start(fault.status, head)
         return [body]
 
-    server = make_server("127.0.0.1", 0, door, threaded=True, request_handler=_Quiet)
+    server = make_server("127.0.0.1", 0, door, threaded=True, request_handler=Quiet)
     store.address = f"http://127.0.0.1:{server.server_port}"
     running = threading.Thread(target=server.serve_forever, daemon=True)
     running.start()

@@ -24,6 +24,7 @@ def loaded_by(code):
     return set(done.stdout.decode().splitlines()[-1].split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("args", [["--help"], ["--version"], []])
 def test_the_front_door_loads_nothing_heavy(args):
     code = f"import dmpcli.cli\ntry:\n    dmpcli.cli.app({args!r})\nexcept SystemExit:\n    pass"
@@ -163,6 +164,7 @@ def told(request, tmp_path_factory):
     return command, subprocess.run(command, cwd=folder, capture_output=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["closed", "broken"])
 def test_whoever_closes_standard_error_changes_no_output_and_no_exit_code(how, told, tmp_path):
     command, sound = told
@@ -200,6 +202,7 @@ def test_a_closed_standard_error_is_no_file_of_the_run(tmp_path):
     assert (tmp_path / "journal").read_bytes() == b"1"
 
 
+@pytest.mark.slow
 def test_a_reader_of_standard_output_that_has_gone_is_still_told_by_the_exit_code(tmp_path):
     reader, writer = os.pipe()
     os.close(reader)

@@ -41,6 +41,7 @@ def test_no_extra_is_needed_without_asking_for_it():
     assert not asked & set(names(PROJECT["dependencies"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)
 @pytest.mark.parametrize("python", [(3, 11), (3, 12), (3, 13), (3, 14), (3, 15)])
 @pytest.mark.parametrize("machine", MACHINES, ids="-".join)

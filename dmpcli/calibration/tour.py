@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,9 +23,11 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import plan as planning
 from dmpcli.planning import preflight
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, PlannedStroke, Pose
+from dmpcli.planning.plan import Plan
 from dmpcli.records.static_poses import StaticPose
 from dmpcli.settings.calibrate import CalibrateSettings
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 _TRIES = 3
 
@@ -93,8 +96,8 @@ class Tour:
         """
         s = self._settings
         state = self._arm.servo.state()
-        home = (state.position, state.rotation)
-        goals = [(state.position, R) for R in around(state.rotation, s.poses, s.tilt)]
+        home = state.pose
+        goals = [replace(home, rotation=R) for R in around(state.rotation, s.poses, s.tilt)]
         self._check(state, [home, *goals, home])
         self._at_start = self._sensing.newest.wrench
         for number, goal in enumerate(goals, start=1):
@@ -109,10 +112,10 @@ class Tour:
         guards.check_period(arm.info, s.period, f"--period {s.period:g}")
         guards.check_state(state, s.workspace)
         # The sensor's turn on the flange changes nothing here.
-        check_orientations(np.array([R for _, R in stops[1:-1]]), s.condition)
+        check_orientations(np.array([stop.rotation for stop in stops[1:-1]]), s.condition)
         if self._reach is None:
             return
-        joints = self._reach.standing(state.joints, *stops[0])
+        joints = self._reach.standing(state.joints, stops[0])
         for start, goal in pairwise(stops):
             plan, there = self._way(start, goal), self._there(goal)
             checks, joints = preflight.by_joints(plan, there, self._reach, joints)
@@ -126,13 +129,13 @@ class Tour:
                         "smaller --tilt"
                     )
 
-    def _there(self, goal: Pose) -> PlannedStroke:
+    def _there(self, goal: Pose) -> StrokeTrajectory:
         """A stroke of one period that stays in a pose."""
-        return PlannedStroke(
-            "pose",
+        return StrokeTrajectory(
             np.array([0.0, self._settings.period]),
-            np.array([goal[0], goal[0]]),
-            np.array([goal[1], goal[1]]),
+            np.array([goal.position, goal.position]),
+            np.array([goal.rotation, goal.rotation]),
+            id="pose",
         )
 
     def _way(self, start: Pose, goal: Pose) -> Plan:
@@ -151,7 +154,7 @@ class Tour:
             torque=s.max_torque,
         )
         loop = ServoLoop(
-            self._way((state.position, state.rotation), goal),
+            self._way(state.pose, goal),
             _limits(s),
             watch,
             self._arm,

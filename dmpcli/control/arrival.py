@@ -13,7 +13,8 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InstrumentError, beside
 from dmpcli.instruments.protocols import RobotState
-from dmpcli.planning.plan import Plan, Pose
+from dmpcli.planning.plan import Plan
+from dmpcli.spatial.pose import Pose
 
 TOLERANCE, ANGLE = 1.0, 0.0175
 """How far off the last set-point an arm may come to rest, mm and rad."""
@@ -133,10 +134,10 @@ class ArrivalMonitor:
             raise self._missed(state, goal, "rests elsewhere than at its last set-point")
 
     def _gap(self, state: RobotState, goal: Pose) -> tuple[float, float]:
-        away: Floats = state.position - goal[0]
+        away: Floats = state.position - goal.position
         if self._normal is not None:
             away = away - (away @ self._normal) * self._normal
-        return math.sqrt(away @ away), _angle(float(state.rotation.ravel() @ goal[1].ravel()))
+        return math.sqrt(away @ away), _angle(float(state.rotation.ravel() @ goal.rotation.ravel()))
 
     def _missed(self, state: RobotState, goal: Pose, how: str) -> InstrumentError:
         gap, turn = self._gap(state, goal)

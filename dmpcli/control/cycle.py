@@ -29,8 +29,7 @@ from dmpcli.control.stopping import AT_REST, StopOutcome
 from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Clock, RobotState, Servo, ServoInfo
 from dmpcli.settings.ranges import Box
-
-Pose = tuple[Floats, Floats]
+from dmpcli.spatial.pose import Pose
 
 
 @dataclass(frozen=True)
@@ -285,12 +284,12 @@ class ControlLoop(ABC):
                 setpoint = self._next(cycle)
                 # What is owed only queues: each set-point waits for a period of its own.
                 for _ in range(cycle.missed if self._streams and self._arm.info.queues else 0):
-                    self._took(setpoint, servo.send(*setpoint))
+                    self._took(setpoint, servo.send(setpoint.position, setpoint.rotation))
                     setpoint = self._next(cycle, owed=True)
             except (StoppedAtOnce, DmpError):
                 self._record(cycle, None, None)
                 raise
-            taken = not self._streams or servo.send(*setpoint)
+            taken = not self._streams or servo.send(setpoint.position, setpoint.rotation)
             sent = clock.now()
             self._record(cycle, setpoint, max(sent - begin - cycle.due, 0.0))
             self._took(setpoint, taken)
@@ -331,7 +330,7 @@ class ControlLoop(ABC):
             raise InstrumentError("robot: refused a set-point; see its pendant")
         self._last = setpoint
         if self._streams:
-            self._trail.add(*setpoint)
+            self._trail.add(setpoint)
 
     def _start(self) -> None:
         """Let the arm enter servo mode; from now on it may move."""
@@ -360,7 +359,7 @@ class ControlLoop(ABC):
         Parameters
         ----------
         cycle : Cycle
-        setpoint : tuple of array, or None
+        setpoint : Pose or None
         lateness : float or None
             From the deadline to the set-point's being sent, s; None where the loop stopped before.
         """

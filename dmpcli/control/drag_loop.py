@@ -21,7 +21,6 @@ from dmpcli.control.cycle import (
     StopLimits,
     StoppedAtOnce,
 )
-from dmpcli.control.cycle import Pose as Led
 from dmpcli.control.demonstration_log import DemonstrationLog
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.signals import Interruption
@@ -36,6 +35,7 @@ from dmpcli.instruments.protocols import (
     ServoInfo,
 )
 from dmpcli.settings.record import RecordSettings
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
 
 STILL = 0.5
@@ -239,12 +239,12 @@ class Recorder(ControlLoop):
         self._heed()
         self._tell_begin(self._clock.now())
 
-    def _next(self, cycle: Cycle, owed: bool = False) -> Led:  # noqa: ARG002
+    def _next(self, cycle: Cycle, owed: bool = False) -> Pose:  # noqa: ARG002
         """Move the reference by one period; it brakes at the end, and where nothing is felt."""
         if self._ended and self._interruption.count > 1:
             raise StoppedAtOnce("stopped at once at the second signal")
         if self._reference is None or self._home is None:
-            return cycle.state.position, cycle.state.rotation
+            return cycle.state.pose
         if cycle.wrench is not None:
             self._listen(cycle)
         if cycle.wrench is None or self._ended:
@@ -253,7 +253,7 @@ class Recorder(ControlLoop):
             reference = move(self._law, self._reference, cycle.wrench, self._home, self._bounds)
         self._reference = reference
         guards.check_setpoint(reference.position, reference.rotation, self._workspace)
-        return reference.position, reference.rotation
+        return Pose(reference.position, reference.rotation)
 
     def _listen(self, cycle: Cycle) -> None:
         """Make the drag heavier along the tool where it chatters on the work."""
@@ -262,7 +262,7 @@ class Recorder(ControlLoop):
             self._law = damped(self._law, axis)
             self._noticed(self.chatter.said())
 
-    def _record(self, cycle: Cycle, setpoint: Led | None, lateness: float | None) -> None:  # noqa: ARG002
+    def _record(self, cycle: Cycle, setpoint: Pose | None, lateness: float | None) -> None:  # noqa: ARG002
         if self._ended or lateness is None:
             return
         t = self._age(cycle.state)

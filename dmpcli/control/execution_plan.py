@@ -2,21 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmpcli.control import execution, guards
 from dmpcli.control.cycle import ReadyArm
-from dmpcli.control.stroke_file import FoundStroke, StrokeSelection, listed
 from dmpcli.errors import InputError, RefusedError
-from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import transfers
 from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
+from dmpcli.records.stroke_selection import StrokeSelection, listed
 from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.spatial.trajectory import StrokeTrajectory
+
+if TYPE_CHECKING:
+    from dmpcli.kinematics.reachability import Reach
 
 CLEARANCE = 20.0
 """Distance from the work in the air where none is given, mm."""
@@ -51,7 +54,7 @@ def lifts(batch: StrokeSelection, settings: ExecuteSettings) -> bool:
     The single stroke of a file ends where it ends, and the pen stays there; to its start it is led
     through the air all the same, where it stands elsewhere.
     """
-    return batch.folder or len(batch.found) > 1 or settings.clearance is not None
+    return batch.folder or len(batch.strokes) > 1 or settings.clearance is not None
 
 
 def ways(settings: ExecuteSettings, lookahead: float, presses: bool) -> TransferOptions:
@@ -93,7 +96,7 @@ def prepare(
     arm: ReadyArm,
     presses: bool,
     advance: Callable[[int], None],
-    reach: Reach | None = None,
+    reach: "Reach | None" = None,
 ) -> list[CheckedPlan]:
     """Plan all strokes from where the arm stands, and judge each with the ways to it and off it.
 
@@ -124,12 +127,12 @@ def prepare(
     if not leave and (near or settings.approach is None):
         return [CheckedPlan(*execution.prepare(strokes[0], settings, state, reach))]
     between = ways(settings, arm.info.lookahead, presses)
-    start, limits = (state.position, state.rotation), limits_of(settings)
+    start, limits = state.pose, limits_of(settings)
     if settings.approach is None:
         standing = [replace(check, remedy=_COME) for check in standing]
     else:
         standing = []
-    joints = None if reach is None else reach.standing(state.joints, *start)
+    joints = None if reach is None else reach.standing(state.joints, start)
     judged: list[CheckedPlan] = []
     made = transfers.plans(
         strokes,
@@ -182,17 +185,17 @@ def facts_of(batch: StrokeSelection) -> dict[str, Any]:
         that were passed over.
     """
     own = ("start", "goal", "normal")
-    shared = {key: value for key, value in batch.found[0].facts.items() if key not in own}
+    shared = {key: value for key, value in batch.strokes[0].facts.items() if key not in own}
     return {
         "trajectory": shared,
-        "strokes": [_known(found, own) for found in batch.found],
+        "strokes": [_known(stroke, own) for stroke in batch.strokes],
         "failed": list(batch.failed),
     }
 
 
-def _known(found: FoundStroke, keys: Sequence[str]) -> dict[str, Any]:
-    said = {key: found.facts[key] for key in keys if found.facts.get(key) is not None}
-    return {"id": found.stroke.id} | said
+def _known(stroke: StrokeTrajectory, keys: Sequence[str]) -> dict[str, Any]:
+    said = {key: stroke.facts[key] for key in keys if stroke.facts.get(key) is not None}
+    return {"id": stroke.id} | said
 
 
 def rest_of(batch: StrokeSelection, drawn: Sequence[str]) -> str:
@@ -204,7 +207,7 @@ def rest_of(batch: StrokeSelection, drawn: Sequence[str]) -> str:
     drawn : sequence of str
         Those that are whole.
     """
-    ids = [found.stroke.id for found in batch.found]
+    ids = [stroke.id for stroke in batch.strokes]
     left = execution.progress_of(ids, drawn)["remaining"]
     if not left:
         return f"all {len(ids)} strokes are drawn" if len(ids) > 1 else "the stroke is drawn"

@@ -292,7 +292,7 @@ class ForceTracker:
         """
         self.supervisor.leaves(t)
         plan, normal = self._plan, self._plan.normal_at(index)
-        gone = float((plan.at(index)[0] - plan.position[plan.last]) @ normal) / self._reach
+        gone = float((plan.at(index).position - plan.position[plan.last]) @ normal) / self._reach
         left: Floats = max(1.0 - gone, 0.0) * self._delta[0] * normal
         return left
 

@@ -19,7 +19,8 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
 from dmpcli.planning.goal_course import Course
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, PlannedStroke
+from dmpcli.planning.plan import Plan
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 LONGEST = 30_000
 """Set-points of a stroke whose goal may move: a plan is made anew within a cycle."""
@@ -272,7 +273,7 @@ def _three(point: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-def plane_of(stroke: PlannedStroke, facts: Mapping[str, Any]) -> Floats:
+def plane_of(stroke: StrokeTrajectory) -> Floats:
     """Return the unit normal of a stroke's plane, shape (3,).
 
     Raises
@@ -282,13 +283,13 @@ def plane_of(stroke: PlannedStroke, facts: Mapping[str, Any]) -> Floats:
     RefusedError
         It lies on a surface that is none.
     """
-    if facts.get("model") == "original":
+    if stroke.facts.get("model") == "original":
         raise InputError(
             f"{_WHAT}: the original model scales the stroke by its goal, which then cannot move; "
             "fit a modified one"
         )
     if stroke.normal is None:
-        known = facts.get("normal")
+        known = stroke.facts.get("normal")
         if known is None:
             raise InputError(
                 f"{_WHAT}: stroke {stroke.id} does not say which plane it lies on; make it anew "

@@ -13,6 +13,7 @@ from dmpcli.arrays import Floats, finite
 from dmpcli.errors import InputError, InstrumentError, RefusedError, beside
 from dmpcli.instruments.protocols import PlanPlayer, RobotState, Servo, ServoInfo
 from dmpcli.settings.ranges import Box
+from dmpcli.spatial.pose import Pose
 
 LAG = 0.1
 """The actual pose may lag the set-points by this much more than the look-ahead, s."""
@@ -238,14 +239,14 @@ class FollowingErrorMonitor:
         self._positions, self._rotations = np.zeros((window, 3)), np.zeros((window, 9))
         self._count = 0
         self._distance, self._angle = distance, angle
-        self.last: tuple[Floats, Floats] | None = None
+        self.last: Pose | None = None
 
-    def add(self, position: Floats, rotation: Floats) -> None:
+    def add(self, setpoint: Pose) -> None:
         """Remember a set-point that was sent."""
         at = self._count % len(self._positions)
-        self._positions[at], self._rotations[at] = position, rotation.ravel()
+        self._positions[at], self._rotations[at] = setpoint.position, setpoint.rotation.ravel()
         self._count += 1
-        self.last = (position, rotation)
+        self.last = setpoint
 
     def strayed(self, state: RobotState) -> tuple[float, float]:
         """Distance and angle to the nearest set-point, mm and rad; 0 before the first."""

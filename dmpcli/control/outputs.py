@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 from dmpcli.errors import DmpError, InputError, InstrumentError
 from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer, Servo
-from dmpcli.planning.plan import Plan, PlannedStroke
+from dmpcli.planning.plan import Plan
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 
-def names_of(strokes: Sequence[PlannedStroke]) -> list[str]:
+def names_of(strokes: Sequence[StrokeTrajectory]) -> list[str]:
     """Names of the outputs that some strokes switch, in order."""
     return list(dict.fromkeys(event.output for one in strokes for event in one.events))
 

@@ -14,7 +14,7 @@ from dmpcli.control.cycle import Cycle, StoppedAtOnce
 from dmpcli.control.guards import LAG, FollowingErrorMonitor
 from dmpcli.control.servo_loop import PlanLoop
 from dmpcli.instruments.protocols import PlanPlayer
-from dmpcli.planning.plan import Pose
+from dmpcli.spatial.pose import Pose
 
 # The controller's clock may run so far ahead of ours by the end of a plan, s.
 _AHEAD = 0.1
@@ -38,7 +38,7 @@ class Playback(PlanLoop):
         )
         self._ahead = round(_AHEAD / self._period)
         for number in range(self._ahead + 1):
-            self._trail.add(*self.plan.at(min(number, len(self.plan) - 1)))
+            self._trail.add(self.plan.at(min(number, len(self.plan) - 1)))
         position = np.concatenate([plan.position for plan in plans])
         rotation = np.concatenate([plan.rotation for plan in plans])
         self._meanwhile()
@@ -61,7 +61,7 @@ class Playback(PlanLoop):
 
     def _advance(self) -> None:
         super()._advance()
-        self._trail.add(*self.plan.at(min(self._cursor.index + self._ahead, len(self.plan) - 1)))
+        self._trail.add(self.plan.at(min(self._cursor.index + self._ahead, len(self.plan) - 1)))
 
     def _setpoint(self, cycle: Cycle) -> Pose:  # noqa: ARG002
         """Where the plan is now; it was checked before it was handed over."""

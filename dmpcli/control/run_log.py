@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import AnyArray, Floats
-from dmpcli.metrics.timing import punctuality
 from dmpcli.records.row_buffer import RECOVERED, RowBuffer
 from dmpcli.records.schemas import (
     EULER_ANGLES,
@@ -20,8 +19,7 @@ from dmpcli.records.schemas import (
     suffixed,
 )
 from dmpcli.spatial import rotations
-
-Pose = tuple[Floats, Floats]
+from dmpcli.spatial.pose import Pose
 
 
 @dataclass(frozen=True)
@@ -34,8 +32,8 @@ class Row:
         When the actual pose was read, s since the first deadline.
     t_plan : float
         Time along the trajectory file, s; after a missed deadline it lags further behind `t`.
-    planned, sent, actual : tuple of array, shape (3,) and (3, 3)
-        mm; a cycle that stopped before it sent repeats the last set-point.
+    planned, sent, actual : Pose
+        A cycle that stopped before it sent repeats the last set-point.
     deadline, lateness : float
         When the set-point was due, s since the first, and how much later it was sent, s.
     wrench : array, shape (6,), or None
@@ -144,7 +142,8 @@ class RunLog:
             The loop's clock, s.
         row : Row
         """
-        planned = row.planned if self._oriented else row.planned[:1]
+        planned, sent, actual = (_numbers(at) for at in (row.planned, row.sent, row.actual))
+        planned = planned if self._oriented else planned[:1]
         felt: tuple[float | Floats, ...] = ()
         if self._sensed:
             felt = (np.nan if row.wrench is None else row.wrench,)
@@ -159,7 +158,7 @@ class RunLog:
         words = [row.state, row.phase, row.id or ""]
         words += [row.event] if self._switching else []
         words += [row.contact] if self._coupled else []
-        self.rows.add((clock, *times, *planned, *row.sent, *row.actual, *felt), words)
+        self.rows.add((clock, *times, *planned, *sent, *actual, *felt), words)
 
     def columns(self) -> dict[str, AnyArray]:
         """Return the columns of the run file, each of shape (rows,)."""
@@ -210,10 +209,16 @@ def recovered(known: Mapping[str, AnyArray], options: Mapping[str, Any]) -> dict
     options : mapping
         Of its provenance; the servo period.
     """
+    from dmpcli.metrics.timing import punctuality
+
     found = punctuality(known["deadline"], known["lateness"], float(options["period"]))
     late = {"p50": found.median, "p99": found.p99, "max": found.worst}
     ended = {"reason": RECOVERED, "completed": False}
     return ended | {"missed": found.missed, "lateness": late}
+
+
+def _numbers(pose: Pose) -> tuple[Floats, ...]:
+    return pose.position, pose.rotation
 
 
 def _split(values: Floats, names: tuple[str, ...], suffix: str) -> dict[str, AnyArray]:

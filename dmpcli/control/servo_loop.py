@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from dmpcli.arrays import Floats
 from dmpcli.control.arrival import ArrivalMonitor
@@ -20,8 +20,6 @@ from dmpcli.control.cycle import (
     StopLimits,
     StoppedAtOnce,
 )
-from dmpcli.control.force_tracking import ForceInput, ForceTracker
-from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.guards import LAG
 from dmpcli.control.outputs import OutputSwitch, failed
 from dmpcli.control.plan_cursor import PlanCursor
@@ -31,7 +29,12 @@ from dmpcli.control.step_limits import StepLimits, check_start
 from dmpcli.errors import DmpError, InputError, RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Pose
+from dmpcli.planning.plan import Plan
+from dmpcli.spatial.pose import Pose
+
+if TYPE_CHECKING:  # neither is loaded where neither is asked for
+    from dmpcli.control.force_tracking import ForceInput, ForceTracker
+    from dmpcli.control.goal_following import GoalFollower
 
 DONE = "done"
 
@@ -91,11 +94,11 @@ class PlanLoop(ControlLoop):
         limits: Limits,
         watch: StopLimits,
         arm: ReadyArm,
-        touch: ForceInput | None = None,
+        touch: "ForceInput | None" = None,
         hindrance: Callable[[], DmpError | None] = lambda: None,
         then: Sequence[Plan] = (),
         outputs: OutputSwitch | None = None,
-        goals: GoalFollower | None = None,
+        goals: "GoalFollower | None" = None,
     ) -> None:
         super().__init__(plan.period, watch, limits.workspace, self.STREAMS, hindrance)
         self._take(arm, touch)
@@ -157,10 +160,10 @@ class PlanLoop(ControlLoop):
         if pressing is None or touch is None or last is None:
             return failure
         if failure is None and self._rested:
-            pressing.clear(touch.look_back(last[1]), last[1])
+            pressing.clear(touch.look_back(last.rotation), last.rotation)
         if pressing.supervisor.across is None or str(failure) != pressing.failure:
             return failure
-        readings = touch.look_back(last[1])
+        readings = touch.look_back(last.rotation)
         pressing.look_back(self._cursor.index, readings, touch.sensing.interval)
         return RefusedError(pressing.failure)
 
@@ -314,7 +317,7 @@ class PlanLoop(ControlLoop):
     def _record(self, cycle: Cycle, setpoint: Pose | None, lateness: float | None) -> None:
         index, state = self._cursor.index, cycle.state
         draws = self.plan.draws_at(index)
-        actual = (state.position, state.rotation)
+        actual = state.pose
         switched, failure = self._switched, None
         if self._outputs is not None and setpoint is not None:
             now, self._switched = self._arm.clock.now() - self._begin, ""
@@ -379,15 +382,16 @@ class ServoLoop(PlanLoop):
         if pressing is not None and cursor.waiting and pressing.settled:
             cursor.release()
         index = cursor.index
-        position, rotation = self.plan.at(index)
+        setpoint = self.plan.at(index)
         if pressing is not None:
-            position = position + self._pressed(pressing, cycle, index)
+            pressed = setpoint.position + self._pressed(pressing, cycle, index)
+            setpoint = Pose(pressed, setpoint.rotation)
             if pressing.supervisor.urgent:
                 raise RefusedError(pressing.failure)
-        self._steps.check(self._last, position, rotation)
-        return position, rotation
+        self._steps.check(self._last, setpoint)
+        return setpoint
 
-    def _pressed(self, pressing: ForceTracker, cycle: Cycle, index: float) -> Floats:
+    def _pressed(self, pressing: "ForceTracker", cycle: Cycle, index: float) -> Floats:
         """Return what the force coupling adds to the set-point, shape (3,), mm."""
         plan, cursor, t = self.plan, self._cursor, cycle.due
         if cursor.braking:

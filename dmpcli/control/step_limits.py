@@ -9,7 +9,8 @@ from dmpcli.control import guards
 from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, Pose, gap
+from dmpcli.planning.plan import Plan
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import log_one
 
 # The arm may be so far from the first set-point, mm and rad: brakes that are released let it sink
@@ -39,7 +40,7 @@ def check_start(state: RobotState, plan: Plan, limits: Limits) -> None:
         Its pose is not a number.
     """
     guards.check_state(state, limits.workspace)
-    distance, angle = gap((state.position, state.rotation), plan.at(0))
+    distance, angle = state.pose.apart(plan.at(0))
     far = min(_START_DISTANCE, max(limits.speed * plan.period, _NOISE_DISTANCE))
     turned = min(_START_ANGLE, max(limits.rotation_speed * plan.period, _NOISE_ANGLE))
     if not (distance <= far and angle <= turned):
@@ -64,25 +65,26 @@ class StepLimits:
         self._limits, self._period = limits, period
         self._step: Floats = np.zeros(6)
 
-    def check(self, before: Pose | None, position: Floats, rotation: Floats) -> None:
+    def check(self, before: Pose | None, setpoint: Pose) -> None:
         """Refuse to send what the checks before the motion cannot have seen.
 
         Parameters
         ----------
-        before : tuple of array, or None
+        before : Pose or None
             The set-point sent last.
-        position, rotation : array, shape (3,) and (3, 3)
-            The next one, mm.
+        setpoint : Pose
+            The next one.
 
         Raises
         ------
         RefusedError
         """
+        position, rotation = setpoint.position, setpoint.rotation
         guards.check_setpoint(position, rotation, self._limits.workspace)
         if before is None:
             return
         period, limits = self._period, self._limits
-        step = np.concatenate([position - before[0], log_one(rotation @ before[1].T)])
+        step = np.concatenate([position - before.position, log_one(rotation @ before.rotation.T)])
         speed, turning = _sizes(step / period)
         if not (
             speed <= (1.0 + _SLACK) * limits.speed

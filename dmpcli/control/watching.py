@@ -13,11 +13,14 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dmpcli.control.servo_loop import PlanLoop
-from dmpcli.live_view import ABOVE, END, READY, SIZE, RowView, SharedRow
 from dmpcli.messages import diverted, watched
 from dmpcli.records.row_buffer import RowBuffer
+
+if TYPE_CHECKING:  # loaded where somebody watches
+    from dmpcli.live_view import RowView
 
 _PATIENCE = 2.0
 """s for which the view may take to load what it needs, and to draw its last picture."""
@@ -43,8 +46,10 @@ class RunView:
     period: float
     whole: float | None = None
 
-    def of_rows(self) -> RowView:
+    def of_rows(self) -> "RowView":
         """Return what the process that draws must know."""
+        from dmpcli.live_view import RowView
+
         rows = self.rows
         return RowView(self.title, self.period, self.whole, rows.groups, list(rows.texts))
 
@@ -73,6 +78,8 @@ def live(view: Callable[[], RunView], wanted: bool) -> Iterator[Callable[[str], 
     if not (wanted and watched()):
         yield lambda _: None
         return
+    from dmpcli.live_view import ABOVE, SIZE, SharedRow
+
     with contextlib.ExitStack() as stack:
         try:
             shown = view()
@@ -102,6 +109,8 @@ def live(view: Callable[[], RunView], wanted: bool) -> Iterator[Callable[[str], 
 
 def _await(process: "subprocess.Popen[str]") -> None:
     """Wait until the view has loaded what it needs, so that this does not fall into the run."""
+    from dmpcli.live_view import READY
+
     assert process.stdout is not None
     with contextlib.suppress(OSError, ValueError):
         if select.select([process.stdout], [], [], _PATIENCE)[0]:
@@ -109,6 +118,8 @@ def _await(process: "subprocess.Popen[str]") -> None:
 
 
 def _ended(process: "subprocess.Popen[str]", reason: str) -> None:
+    from dmpcli.live_view import END
+
     _written(process, END, reason)
     # The last picture is waited for: it need not stand back any more.
     with contextlib.suppress(OSError, AttributeError):

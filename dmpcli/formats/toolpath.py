@@ -6,7 +6,6 @@ within a tolerance of where the line is at the same time, so that the speed is k
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -223,29 +222,41 @@ def thinned(one: MotionStroke, tolerance: float, corners: Sequence[int] = ()) ->
     n = len(one)
     if tolerance <= 0.0 or n < 3:
         return np.arange(n)
-    R = None if one.rotation is None else np.asarray(one.rotation)
     keep = np.zeros(n, dtype=bool)
     keep[[0, -1, *corners]] = True
-    waiting = list(pairwise(np.flatnonzero(keep).tolist()))
-    while waiting:
-        first, last = waiting.pop()
-        if last - first < 2:
-            continue
-        t = one.t[first : last + 1]
-        share = ((t - t[0]) / (t[-1] - t[0]))[1:-1, None]
-        p = one.position[first : last + 1]
-        off = np.linalg.norm(p[1:-1] - (p[0] + share * (p[-1] - p[0])), axis=1)
-        if R is not None:
-            whole = log(R[first].T @ R[last])
-            straight = R[first] @ exp(share * whole)
-            lost = log(np.swapaxes(straight, 1, 2) @ R[first + 1 : last])
-            off = np.maximum(off, _ARM * np.linalg.norm(lost, axis=1))
-        worst = int(np.argmax(off))
-        if off[worst] > tolerance:
-            middle = first + 1 + worst
-            keep[middle] = True
-            waiting += [(first, middle), (middle, last)]
-    return np.flatnonzero(keep)
+    ends = np.flatnonzero(keep)
+    first, last = ends[:-1], ends[1:]
+    # All spans of one halving together: a few long arrays instead of many short ones.
+    while True:
+        long = last - first > 1
+        first, last = first[long], last[long]
+        if not len(first):
+            return np.flatnonzero(keep)
+        within = last - first - 1
+        begin = np.cumsum(within) - within
+        row = np.arange(within.sum()) + np.repeat(first + 1 - begin, within)
+        off = _lost(one, np.repeat(first, within), row, np.repeat(last, within))
+        most = np.maximum.reduceat(off, begin)
+        at_most = np.flatnonzero(off == np.repeat(most, within))
+        middle = row[at_most[np.searchsorted(at_most, begin)]]
+        split = most > tolerance
+        first, middle, last = first[split], middle[split], last[split]
+        keep[middle] = True
+        first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
+
+
+def _lost(one: MotionStroke, first: Integers, row: Integers, last: Integers) -> Floats:
+    """How far samples lie off the even motion between two others, shape (n,), mm."""
+    share = ((one.t[row] - one.t[first]) / (one.t[last] - one.t[first]))[:, None]
+    p = one.position
+    off = np.linalg.norm(p[row] - (p[first] + share * (p[last] - p[first])), axis=1)
+    if one.rotation is None:
+        return np.asarray(off)
+    R = np.asarray(one.rotation)
+    begun = np.swapaxes(R[first], 1, 2)
+    straight = R[first] @ exp(share * log(begun @ R[last]))
+    lost = log(np.swapaxes(straight, 1, 2) @ R[row])
+    return np.asarray(np.maximum(off, _ARM * np.linalg.norm(lost, axis=1)))
 
 
 _ARM = 50.0

@@ -13,10 +13,10 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import RefusedError
 from dmpcli.instruments import pose_forms
 from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
-from dmpcli.instruments.pose_forms import Pose
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm
-from dmpcli.spatial.rotations import exp_one, log_one, to_euler
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.rotations import exp_one, to_euler
 from dmpcli.spatial.wrench import Tool
 
 # A step may need a joint speed over its limit by this share: rounding of what was planned.
@@ -61,13 +61,13 @@ class JointSpace:
         """
         return self._tcp(joints, self._base, self._flange)
 
-    def joints(self, position: Floats, rotation: Floats, before: Floats) -> Floats:
+    def joints(self, tcp: Pose, before: Floats) -> Floats:
         """Joint angles of a TCP pose, continuous with the last ones.
 
         Parameters
         ----------
-        position, rotation : array, shape (3,) and (3, 3)
-            mm, in the controller's base frame.
+        tcp : Pose
+            In the controller's base frame.
         before : array, shape (6,)
             rad.
 
@@ -81,16 +81,16 @@ class JointSpace:
         RefusedError
             Out of reach, or beyond a joint's limit.
         """
-        attitude = rotation @ self._attitude.T
-        flange = self._base.T @ (position - attitude @ self._reach)
+        attitude = tcp.rotation @ self._attitude.T
+        flange = self._base.T @ (tcp.position - attitude @ self._reach)
         return inverse.nearest(self._arm, flange, self._base.T @ attitude @ self._flange.T, before)
 
-    def step(self, position: Floats, rotation: Floats, before: Floats, period: float) -> Floats:
+    def step(self, tcp: Pose, before: Floats, period: float) -> Floats:
         """Joint angles of a TCP pose that the arm can reach from the last ones within a period.
 
         Parameters
         ----------
-        position, rotation, before
+        tcp, before
             As in `joints`.
         period : float
             s.
@@ -100,7 +100,7 @@ class JointSpace:
         RefusedError
             As in `joints`; or a joint would have to turn faster than it can.
         """
-        joints = self.joints(position, rotation, before)
+        joints = self.joints(tcp, before)
         speed = np.abs(joints - before) / period
         if not (speed <= (1.0 + _SLACK) * self._arm.speeds).all():
             worst = int(np.argmax(speed / self._arm.speeds))
@@ -129,7 +129,7 @@ class JointSpace:
         ours, theirs = self.tcp(joints), pose_forms.decode(self._declared, reported)
         if self._agree(ours, theirs):
             return
-        distance, angle = _apart(ours, theirs)
+        distance, angle = ours.apart(theirs)
         raise RefusedError(
             f"robot: by its joints the TCP is at {_words(ours)}, by its controller at "
             f"{_words(theirs)}: {distance:.1f} mm and {np.degrees(angle):.1f}° apart; "
@@ -153,17 +153,18 @@ class JointSpace:
         ------
         RefusedError
         """
-        position, rotation = self.tcp(joints)
+        here = self.tcp(joints)
         for move, turn in _TRIALS:
-            goal = (position + np.array(move), exp_one(np.array(turn)) @ rotation)
+            turned = exp_one(np.array(turn)) @ here.rotation
+            goal = Pose(here.position + np.array(move), turned)
             try:
-                ours = self.joints(*goal, joints)
+                ours = self.joints(goal, joints)
             except RefusedError:
                 continue  # near the end of the arm's reach; the others will do
-            answer = theirs(pose_forms.encode(self._declared, *goal), joints)
+            answer = theirs(pose_forms.encode(self._declared, goal), joints)
             if answer is None:
                 return
-            distance, angle = _apart(self.tcp(answer), goal)
+            distance, angle = self.tcp(answer).apart(goal)
             away = float(np.abs(answer - ours).max())
             if not (self._agree(self.tcp(answer), goal) and away <= _SAME_POSTURE):
                 raise RefusedError(
@@ -194,26 +195,21 @@ class JointSpace:
         return "its tool is not that of --tool, or its frames or Euler angles differ"
 
     def _agree(self, one: Pose, other: Pose) -> bool:
-        distance, angle = _apart(one, other)
+        distance, angle = one.apart(other)
         most, most_angle = self._declared.tolerance
         return distance <= most and angle <= most_angle
 
     def _tcp(self, joints: Floats, base: Floats, flange: Floats) -> Pose:
         position, rotation = chain.forward_one(self._arm, joints)
         attitude = base @ rotation @ flange
-        return base @ position + attitude @ self._reach, attitude @ self._attitude
+        return Pose(base @ position + attitude @ self._reach, attitude @ self._attitude)
 
 
 def _about_z(angle: float) -> Floats:
     return exp_one(np.array([0.0, 0.0, angle]))
 
 
-def _apart(one: Pose, other: Pose) -> tuple[float, float]:
-    turn = log_one(other[1] @ one[1].T)
-    return float(np.linalg.norm(other[0] - one[0])), float(np.linalg.norm(turn))
-
-
 def _words(pose: Pose) -> str:
-    x, y, z = pose[0]
-    a, b, c = np.degrees(to_euler(pose[1]))
+    x, y, z = pose.position
+    a, b, c = np.degrees(to_euler(pose.rotation))
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm, ({a:.1f}, {b:.1f}, {c:.1f})°"

@@ -6,12 +6,10 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp, from_euler, from_quaternion, log, to_euler, to_quaternion
 
 METRE = 1000.0
-
-Pose = tuple[Floats, Floats]
-"""Position, shape (3,), in mm, and rotation, shape (3, 3)."""
 
 
 def decode(declared: DriverInfo, values: Floats) -> Pose:
@@ -25,37 +23,34 @@ def decode(declared: DriverInfo, values: Floats) -> Pose:
 
     Returns
     -------
-    position : array, shape (3,)
-        mm.
-    rotation : array, shape (3, 3)
+    Pose
     """
     position = values[:3] * (METRE if declared.length == "m" else 1.0)
     turn = values[3:]
     if declared.orientation == "quaternion":
-        return position, from_quaternion(turn[[1, 2, 3, 0]])
+        return Pose(position, from_quaternion(turn[[1, 2, 3, 0]]))
     angles = np.radians(turn) if declared.angle == "deg" else turn
     if declared.orientation == "rotation vector":
-        return position, exp(angles)
+        return Pose(position, exp(angles))
     if declared.orientation == "xyz euler":
-        return position, from_euler(angles)
-    return position, from_euler(-angles).T  # Rz Ry Rx is the inverse of Rx(-rx) Ry(-ry) Rz(-rz)
+        return Pose(position, from_euler(angles))
+    # Rz Ry Rx is the inverse of Rx(-rx) Ry(-ry) Rz(-rz).
+    return Pose(position, from_euler(-angles).T)
 
 
-def encode(declared: DriverInfo, position: Floats, rotation: Floats) -> Floats:
+def encode(declared: DriverInfo, pose: Pose) -> Floats:
     """Turn mm and a matrix into a pose as a controller reads it; undoes `decode`.
 
     Parameters
     ----------
     declared : DriverInfo
-    position : array, shape (3,)
-        mm.
-    rotation : array, shape (3, 3)
+    pose : Pose
 
     Returns
     -------
     array, shape (6,) or (7,)
     """
-    length = position / (METRE if declared.length == "m" else 1.0)
+    length, rotation = pose.position / (METRE if declared.length == "m" else 1.0), pose.rotation
     if declared.orientation == "quaternion":
         return np.concatenate([length, to_quaternion(rotation)[[3, 0, 1, 2]]])
     if declared.orientation == "rotation vector":

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 from dmpcli.arrays import Floats
+from dmpcli.spatial.pose import Pose
 
 RobotMode = Literal["ready", "stopped", "emergency stop", "protective stop", "fault", "not ready"]
 
@@ -148,6 +149,11 @@ class RobotState:
     joints: Floats | None = None
     detail: str = ""
     busy: bool | None = None
+
+    @property
+    def pose(self) -> Pose:
+        """The actual pose of the TCP."""
+        return Pose(self.position, self.rotation)
 
 
 class Controlled(Protocol):

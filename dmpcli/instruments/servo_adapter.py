@@ -22,9 +22,9 @@ from dmpcli.instruments.driver_protocol import (
     ServoDriver,
 )
 from dmpcli.instruments.joint_space import JointSpace
-from dmpcli.instruments.pose_forms import Pose
 from dmpcli.instruments.protocols import Clock, RobotState, ServoInfo
 from dmpcli.kinematics.reachability import Reach
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
 
 
@@ -114,7 +114,9 @@ class PoseServo:
                 raise RefusedError(f"robot: {said.mode}{said.detail and f': {said.detail}'}")
             pose = self._pose  # an arm that is stopped may tell no pose; it has one
         self._pose = pose
-        return RobotState(said.t, *pose, said.mode, joints, said.detail, said.busy)
+        return RobotState(
+            said.t, pose.position, pose.rotation, said.mode, joints, said.detail, said.busy
+        )
 
     def start(self, period: float) -> None:
         """Enter servo mode.
@@ -150,10 +152,10 @@ class PoseServo:
         if not finite(position, rotation):
             return False
         if self._space is None:
-            return self._driver.send(pose_forms.encode(self._declared, position, rotation))
+            return self._driver.send(pose_forms.encode(self._declared, Pose(position, rotation)))
         if self._sent is None:
             raise self._senseless("no joint angles")
-        joints = self._space.step(position, rotation, self._sent, self._period)
+        joints = self._space.step(Pose(position, rotation), self._sent, self._period)
         taken = self._driver.send(self._written(joints))
         if taken:
             self._sent = joints
@@ -266,9 +268,9 @@ class PlanServo(PoseServo):
             The controller does not take them.
         """
         assert isinstance(self._driver, PlanDriver)
-        poses = list(zip(position, rotation, strict=True))
+        poses = [Pose(*one) for one in zip(position, rotation, strict=True)]
         if self._space is None:
-            targets = [pose_forms.encode(self._declared, *pose) for pose in poses]
+            targets = [pose_forms.encode(self._declared, pose) for pose in poses]
         else:
             targets = self._all_joints(self._space, poses, period, meanwhile)
         self._driver.upload(np.array(targets), period, meanwhile)
@@ -292,7 +294,7 @@ class PlanServo(PoseServo):
         for number, pose in enumerate(poses):
             meanwhile()
             try:
-                before = space.step(*pose, before, period)
+                before = space.step(pose, before, period)
             except RefusedError as error:
                 raise RefusedError(f"set-point at {number * period:.2f} s: {error}") from None
             targets.append(self._written(before))

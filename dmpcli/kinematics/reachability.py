@@ -15,6 +15,7 @@ from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, inverse, path
 from dmpcli.kinematics.models import Arm
 from dmpcli.kinematics.path import Followed, Peak
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp, from_euler, log, smallest_between
 from dmpcli.spatial.wrench import Tool
 
@@ -77,15 +78,15 @@ class Reach:
         """
         return path.follow(self.arm, *self._flange(position, rotation), period, start)
 
-    def standing(self, joints: Floats | None, position: Floats, rotation: Floats) -> Floats | None:
+    def standing(self, joints: Floats | None, tcp: Pose) -> Floats | None:
         """Return the joint angles that a robot tells, once they agree with where its TCP is.
 
         Parameters
         ----------
         joints : array, shape (6,), or None
             rad.
-        position, rotation : array, shape (3,) and (3, 3)
-            Of the TCP, mm.
+        tcp : Pose
+            Of the TCP.
 
         Raises
         ------
@@ -94,7 +95,7 @@ class Reach:
         """
         if joints is None:
             return None
-        p, R = self._flange(position, rotation)
+        p, R = self._flange(tcp.position, tcp.rotation)
         ours, turned = chain.forward(self.arm, joints) if len(joints) == 6 else (np.inf, R)
         away, angle = float(np.linalg.norm(ours - p)), float(np.linalg.norm(log(turned @ R.T)))
         if not (away <= _AGREE and angle <= _AGREE_ANGLE):

@@ -14,9 +14,10 @@ from dmpcli.planning.limits import Limits
 from dmpcli.planning.spline import between, spline, window
 from dmpcli.spatial import rotations
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 Phase = Literal["approach", "stroke", "retract", "transfer", "stop"]
-Pose = tuple[Floats, Floats]
 
 # Below these the arm stands at the start: a thousandth of a millimetre, and of a degree or so.
 _AT_START = 1e-3
@@ -30,45 +31,6 @@ _WAYS = {
     "stroke": ("the stroke", "raise --speed, or shorten the trajectory"),
 }
 """What takes too many set-points, and what helps."""
-
-
-@dataclass(frozen=True)
-class PlannedStroke:
-    """One trajectory as its file says it.
-
-    Attributes
-    ----------
-    id : str
-    t : array, shape (n,)
-        Strictly increasing, s.
-    position : array, shape (n, 3)
-        mm, base frame.
-    rotation : array, shape (n, 3, 3), or None
-        None holds the arm's orientation at the start.
-    normal : array, shape (n, 3), or None
-        Unit normal of the surface, to the tool's side.
-    first_row : int
-        Row of the file that holds the first sample, counted from 1.
-    events : tuple of OutputEvent
-        What is switched along it, on the time of `t`.
-    force : array, shape (n,), or None
-        Set-point of the force along the normal, N; 0 where the tool is lifted.
-    """
-
-    id: str
-    t: Floats
-    position: Floats
-    rotation: Floats | None = None
-    normal: Floats | None = None
-    first_row: int = 1
-    events: tuple[OutputEvent, ...] = ()
-    force: Floats | None = None
-
-    def pose(self, index: int) -> Pose:
-        """Position and rotation of a sample; the stroke must state an orientation."""
-        if self.rotation is None:
-            raise ValueError("this stroke states no orientation")
-        return self.position[index], self.rotation[index]
 
 
 @dataclass(frozen=True)
@@ -132,8 +94,8 @@ class Plan:
     def __len__(self) -> int:
         return len(self.t)
 
-    def at(self, index: float) -> tuple[Floats, Floats]:
-        """Position and rotation at a set-point's number, or between two: then on a C² curve.
+    def at(self, index: float) -> Pose:
+        """Pose at a set-point's number, or between two: then on a C² curve.
 
         The curve is made anew around the number, in a time that does not depend on the plan's
         length: the loop asks for it when it has to come to rest.
@@ -141,9 +103,9 @@ class Plan:
         i = round(index)
         if abs(index - i) < 1e-9:
             i = min(i, len(self) - 1)
-            return self.position[i], self.rotation[i]
+            return Pose(self.position[i], self.rotation[i])
         near, share = window(index, len(self))
-        return _unflat(between(_flat(self.position[near], self.rotation[near]), share))
+        return Pose(*_unflat(between(_flat(self.position[near], self.rotation[near]), share)))
 
     def time_at(self, index: float) -> float:
         """Time along the trajectory file at a set-point's number or between two, s."""
@@ -196,7 +158,7 @@ class Plan:
 
 
 def make(
-    stroke: PlannedStroke,
+    stroke: StrokeTrajectory,
     period: float,
     speed: float,
     limits: Limits,
@@ -207,15 +169,15 @@ def make(
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     period : float
         Servo period, s.
     speed : float
         1 as planned, 0.5 at half the speed: tau scaled by 1/speed, the same path.
     limits : Limits
         The approach stays inside them.
-    start : tuple of array, shape (3,) and (3, 3)
-        Actual pose, mm.
+    start : Pose
+        The actual one.
     approach : float
         Peak speed of the straight way to the stroke's start, mm/s.
 
@@ -224,17 +186,17 @@ def make(
     InputError
         There would be more than `LONGEST` set-points.
     """
-    sampled = sample(stroke, period, speed, start[1])
+    sampled = sample(stroke, period, speed, start.rotation)
     way = straight("approach", start, sampled.pose(0), period, limits, approach)
     return joined(sampled, [way], [], period, stroke.rotation is not None)
 
 
-def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> PlannedStroke:
+def sample(stroke: StrokeTrajectory, period: float, speed: float, held: Floats) -> StrokeTrajectory:
     """Return a stroke at the servo period, from t = 0, with an orientation.
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     period : float
         Servo period, s.
     speed : float
@@ -262,7 +224,7 @@ def sample(stroke: PlannedStroke, period: float, speed: float, held: Floats) -> 
 
 
 def joined(
-    sampled: PlannedStroke,
+    sampled: StrokeTrajectory,
     before: Sequence[PlanSegment],
     after: Sequence[PlanSegment],
     period: float,
@@ -272,7 +234,7 @@ def joined(
 
     Parameters
     ----------
-    sampled : PlannedStroke
+    sampled : StrokeTrajectory
         At the servo period, with an orientation.
     before, after : sequence of PlanSegment
         An empty leg is none.
@@ -313,12 +275,6 @@ def joined(
     )
 
 
-def gap(start: Pose, goal: Pose) -> tuple[float, float]:
-    """Distance and angle between two poses, mm and rad."""
-    turn = rotations.log(goal[1] @ start[1].T)
-    return float(np.linalg.norm(goal[0] - start[0])), float(np.linalg.norm(turn))
-
-
 def straight(
     phase: Phase,
     start: Pose,
@@ -333,8 +289,8 @@ def straight(
     Parameters
     ----------
     phase : str
-    start, goal : tuple of array, shape (3,) and (3, 3)
-        mm; `goal` itself is left out. Poses that are the same give an empty leg.
+    start, goal : Pose
+        `goal` itself is left out. Poses that are the same give an empty leg.
     period : float
         Servo period, s.
     limits : Limits
@@ -349,7 +305,7 @@ def straight(
     InputError
         There would be more than `LONGEST` set-points.
     """
-    distance, angle = gap(start, goal)
+    distance, angle = start.apart(goal)
     if distance < _AT_START and angle < _AT_START_ANGLE:
         return PlanSegment(phase, np.empty((0, 3)), np.empty((0, 3, 3)))
     distance += spare
@@ -363,11 +319,11 @@ def straight(
     cycles = _cycles(float(duration) / period, period, phase)
     s = np.arange(cycles) / cycles
     u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    turn = rotations.log(goal[1] @ start[1].T)
+    turn = rotations.log(goal.rotation @ start.rotation.T)
     return PlanSegment(
         phase,
-        start[0] + u[:, None] * (goal[0] - start[0]),
-        rotations.exp(u[:, None] * turn) @ start[1],
+        start.position + u[:, None] * (goal.position - start.position),
+        rotations.exp(u[:, None] * turn) @ start.rotation,
     )
 
 

@@ -1,16 +1,20 @@
 """What can be judged before an arm moves, on arrays alone."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import beside
-from dmpcli.kinematics.path import Followed, Peak
-from dmpcli.kinematics.reachability import Reach, singular
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, PlannedStroke
+from dmpcli.planning.plan import Plan
 from dmpcli.spatial import rotations
+from dmpcli.spatial.trajectory import StrokeTrajectory
+
+if TYPE_CHECKING:  # loaded where an arm's joints are judged
+    from dmpcli.kinematics.path import Followed, Peak
+    from dmpcli.kinematics.reachability import Reach
 
 # A stroke that begins or ends slower than this share of the acceleration limit times the servo
 # period is at rest, 9 mm/s and 0.06 rad/s by default: the arm takes up such a step in velocity
@@ -63,12 +67,12 @@ class Check:
         )
 
 
-def at_rest(stroke: PlannedStroke, speed: float, period: float, limits: Limits) -> list[Check]:
+def at_rest(stroke: StrokeTrajectory, speed: float, period: float, limits: Limits) -> list[Check]:
     """Check that the stroke begins and ends at rest, by its end samples.
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     speed : float
         Factor on the file's own speed.
     period : float
@@ -127,7 +131,7 @@ def near_start(distance: float, angle: float, tolerance: float, max_angle: float
     ]
 
 
-def within_limits(plan: Plan, stroke: PlannedStroke, limits: Limits) -> list[Check]:
+def within_limits(plan: Plan, stroke: StrokeTrajectory, limits: Limits) -> list[Check]:
     """Peaks of the set-points' derivatives at the servo period, and the workspace.
 
     The peaks are those of the stroke, unless one on the ways to it and off it is over a limit: ways
@@ -136,7 +140,7 @@ def within_limits(plan: Plan, stroke: PlannedStroke, limits: Limits) -> list[Che
     Parameters
     ----------
     plan : Plan
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
         Names the rows.
     limits : Limits
     """
@@ -173,14 +177,14 @@ def within_limits(plan: Plan, stroke: PlannedStroke, limits: Limits) -> list[Che
 
 
 def by_joints(
-    plan: Plan, stroke: PlannedStroke, reach: Reach, start: Floats | None
+    plan: Plan, stroke: StrokeTrajectory, reach: "Reach", start: Floats | None
 ) -> tuple[list[Check], Floats | None]:
     """Reach, joint angles and joint speeds of a plan; an arm that misses a pose has no others.
 
     Parameters
     ----------
     plan : Plan
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
         Names the rows.
     reach : Reach
     start : array, shape (6,), or None
@@ -197,8 +201,8 @@ def by_joints(
     return _by_joints(plan, stroke, followed), after
 
 
-def _by_joints(plan: Plan, stroke: PlannedStroke, followed: Followed) -> list[Check]:
-    def check(quantity: str, unit: str, peak: Peak, remedy: str) -> Check:
+def _by_joints(plan: Plan, stroke: StrokeTrajectory, followed: "Followed") -> list[Check]:
+    def check(quantity: str, unit: str, peak: "Peak", remedy: str) -> Check:
         value, limit = float(peak.value[0]), float(peak.limit[0])
         if unit != "mm":
             value, limit = float(np.degrees(value)), float(np.degrees(limit))
@@ -210,6 +214,8 @@ def _by_joints(plan: Plan, stroke: PlannedStroke, followed: Followed) -> list[Ch
     if not reach.passed:
         return [reach]
     angle, speed = followed.angle, followed.speed
+    from dmpcli.kinematics.reachability import singular
+
     near = "".join(f"it is {clause}; " for clause in singular(followed.nearness[0]))
     if followed.jumps[0]:
         slower = "no --speed helps, for it jumps: "
@@ -250,7 +256,7 @@ def _slow_down(share: float) -> str:
     return f"slow it down to {factor:g} times its speed with --speed, or " if factor > 0 else ""
 
 
-def _inside(plan: Plan, stroke: PlannedStroke, limits: Limits) -> list[Check]:
+def _inside(plan: Plan, stroke: StrokeTrajectory, limits: Limits) -> list[Check]:
     if limits.workspace is None:
         return []
     low, high = np.array(limits.workspace[::2]), np.array(limits.workspace[1::2])
@@ -269,7 +275,9 @@ def _inside(plan: Plan, stroke: PlannedStroke, limits: Limits) -> list[Check]:
     return checks
 
 
-def _where(plan: Plan, stroke: PlannedStroke, index: int) -> tuple[float | None, int | None, str]:
+def _where(
+    plan: Plan, stroke: StrokeTrajectory, index: int
+) -> tuple[float | None, int | None, str]:
     """Return time and row on the stroke, or the way that leads to it or off it."""
     if not plan.draws_at(index):
         return None, None, f"in the {plan.phase_at(index)}"

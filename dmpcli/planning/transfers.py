@@ -16,7 +16,9 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import plan as planning
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Phase, Plan, PlannedStroke, PlanSegment, Pose
+from dmpcli.planning.plan import Phase, Plan, PlanSegment
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 LONGEST_TOUR = 2_000_000
 """Set-points of a tour, about 0.3 GB; more must be drawn in several runs."""
@@ -71,14 +73,14 @@ class Height:
         return above
 
 
-def off(stroke: PlannedStroke, held: Floats, end: int) -> Floats:
+def off(stroke: StrokeTrajectory, held: Floats, end: int) -> Floats:
     """Unit vector off the work at one end of a stroke.
 
     The surface's normal; where the stroke states none, back along the tool.
 
     Parameters
     ----------
-    stroke : PlannedStroke
+    stroke : StrokeTrajectory
     held : array, shape (3, 3)
         Orientation where the stroke states none.
     end : int
@@ -91,7 +93,7 @@ def off(stroke: PlannedStroke, held: Floats, end: int) -> Floats:
 
 
 def height(
-    strokes: Sequence[PlannedStroke],
+    strokes: Sequence[StrokeTrajectory],
     held: Floats,
     clearance: float,
     ends: tuple[int, ...] = (0, -1),
@@ -100,7 +102,7 @@ def height(
 
     Parameters
     ----------
-    strokes : sequence of PlannedStroke
+    strokes : sequence of StrokeTrajectory
         All points of all of them lie below it, by the clearance at least.
     held : array, shape (3, 3)
         Orientation where a stroke states none.
@@ -132,7 +134,7 @@ def height(
 
 
 def plans(
-    strokes: Sequence[PlannedStroke],
+    strokes: Sequence[StrokeTrajectory],
     period: float,
     speed: float,
     limits: Limits,
@@ -149,7 +151,7 @@ def plans(
 
     Parameters
     ----------
-    strokes : sequence of PlannedStroke
+    strokes : sequence of StrokeTrajectory
         In the order in which they are drawn.
     period : float
         Servo period, s.
@@ -158,8 +160,8 @@ def plans(
         not quicken them.
     limits : Limits
         All ways stay inside them.
-    start : tuple of array, shape (3,) and (3, 3)
-        Actual pose, mm.
+    start : Pose
+        The actual one.
     near : bool
         Whether the arm stands at the first stroke's start and is led straight to it; otherwise it
         rises from where it stands, along the direction of height.
@@ -176,12 +178,12 @@ def plans(
     RefusedError
         No height is free of the work.
     """
-    over = height(strokes, start[1], ways.clearance, (0, -1) if leave else (0,))
+    over = height(strokes, start.rotation, ways.clearance, (0, -1) if leave else (0,))
     travel = _Travel(over, period, limits, ways, min(speed, 1.0))
     first = replace(travel, ways=_slowed(ways, approach))
     here, count = start, 0
     for number, stroke in enumerate(strokes):
-        sampled = planning.sample(stroke, period, speed, start[1])
+        sampled = planning.sample(stroke, period, speed, start.rotation)
         if number > 0:
             before = travel.to(here, sampled)
         else:
@@ -195,7 +197,7 @@ def plans(
                 "s; draw them in several runs, each with some --id"
             )
         yield made
-        here = made.position[-1], made.rotation[-1]
+        here = Pose(made.position[-1], made.rotation[-1])
 
 
 def _slowed(ways: TransferOptions, approach: float | None) -> TransferOptions:
@@ -214,18 +216,18 @@ class _Travel:
     ways: TransferOptions
     slow: float
 
-    def led(self, here: Pose, stroke: PlannedStroke) -> list[PlanSegment]:
+    def led(self, here: Pose, stroke: StrokeTrajectory) -> list[PlanSegment]:
         """Straight to a start that the arm stands at, but for a small gap."""
         return [self._leg("approach", here, stroke.pose(0), self.ways.landing)]
 
-    def to(self, here: Pose, stroke: PlannedStroke) -> list[PlanSegment]:
+    def to(self, here: Pose, stroke: StrokeTrajectory) -> list[PlanSegment]:
         """Rise, cross, sink, land."""
         goal, speed, over = stroke.pose(0), self.ways.transfer, self.height
-        hover = goal[0] + self.ways.clearance * off(stroke, goal[1], 0), goal[1]
+        hover = self._hover(stroke, goal, 0)
         # An arm that stands higher crosses where it is.
-        level = max(over.level, float(here[0] @ over.up))
-        risen = over.over(here[0], level), here[1]
-        above = over.over(hover[0], level), goal[1]
+        level = max(over.level, float(here.position @ over.up))
+        risen = replace(here, position=over.over(here.position, level))
+        above = replace(hover, position=over.over(hover.position, level))
         return [
             self._leg("transfer", here, risen, speed),
             self._leg("transfer", risen, above, speed),
@@ -233,12 +235,16 @@ class _Travel:
             self._leg("approach", hover, goal, self.ways.landing),
         ]
 
-    def off(self, stroke: PlannedStroke) -> list[PlanSegment]:
+    def off(self, stroke: StrokeTrajectory) -> list[PlanSegment]:
         """Wait for the arm at the stroke's end, then leave the work along the normal."""
         end = stroke.pose(-1)
-        hover = end[0] + self.ways.clearance * off(stroke, end[1], -1), end[1]
+        hover = self._hover(stroke, end, -1)
         way = self._leg("retract", end, hover, self.ways.retract, self.ways.spare)
         return [_held("retract", end, self.ways.settling), way, _held("retract", hover, 1)]
+
+    def _hover(self, stroke: StrokeTrajectory, at: Pose, end: int) -> Pose:
+        """Off the work at one end of a stroke."""
+        return Pose(at.position + self.ways.clearance * off(stroke, at.rotation, end), at.rotation)
 
     def _leg(
         self, phase: Phase, here: Pose, goal: Pose, speed: float, spare: float = 0.0
@@ -258,5 +264,7 @@ class _Travel:
 
 def _held(phase: Phase, pose: Pose, count: int) -> PlanSegment:
     return PlanSegment(
-        phase, np.repeat(pose[0][None], count, axis=0), np.repeat(pose[1][None], count, axis=0)
+        phase,
+        np.repeat(pose.position[None], count, axis=0),
+        np.repeat(pose.rotation[None], count, axis=0),
     )

@@ -1,7 +1,6 @@
 """The trajectories of a file: one reader for all who draw, measure or describe them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -14,37 +13,13 @@ from dmpcli.records.record import Record
 from dmpcli.spatial import output_events
 from dmpcli.spatial.output_events import OutputEvent
 from dmpcli.spatial.rotations import from_euler
-from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 LARGEST_FORCE = 1e4
 """More along the normal is a slip of the unit, N."""
 
 UNIT = 1e-3
 """By how much the length of a unit normal may miss 1, and its direction another's, rad."""
-
-
-@dataclass(frozen=True)
-class StoredTrajectory(Trajectory):
-    """A trajectory as its file says it.
-
-    Attributes
-    ----------
-    id : str
-    first_row : int
-        Row of the file that holds the first sample, counted from 1.
-    facts : dict
-        What the file says beside it; of a batch, with the start, goal and normal of its pair.
-    events : tuple of OutputEvent
-        What is switched along it.
-    force : array, shape (n,), or None
-        Set-point of the force along the normal, N; 0 where the tool is lifted.
-    """
-
-    id: str = ""
-    first_row: int = 1
-    facts: dict[str, Any] = field(default_factory=dict)
-    events: tuple[OutputEvent, ...] = ()
-    force: Floats | None = None
 
 
 def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
@@ -59,7 +34,7 @@ def rows_by_id(ids: AnyArray) -> dict[str, Integers]:
 
 def stored(
     record: Record, name: str, rows: Integers, facts: Mapping[str, Any] | None = None
-) -> StoredTrajectory:
+) -> StrokeTrajectory:
     """Return some rows of a record as one trajectory.
 
     Parameters
@@ -88,7 +63,7 @@ def stored(
             f"{t[at - 1]:g} s; time must increase from row to row"
         )
     angles = _optional(record, schemas.EULER_ANGLES, rows)
-    return StoredTrajectory(
+    return StrokeTrajectory(
         t,
         record.position()[rows],
         None if angles is None else from_euler(angles),

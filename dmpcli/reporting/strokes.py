@@ -14,9 +14,10 @@ from dmpcli.records import schemas, tolerance_mark
 from dmpcli.records.file_io import DASH
 from dmpcli.records.record import Record
 from dmpcli.records.schemas import OK
-from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
+from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.reporting import tracking
 from dmpcli.reporting.stroke import LEAST, ReportedStroke, chart_axes
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from dmpcli.surfaces import plane
 
 
@@ -108,7 +109,7 @@ def labels_of(names: Sequence[str]) -> list[str]:
 
 
 def _planned(
-    one: StoredTrajectory, plan: Floats, label: str, role: str, normal: Floats | None
+    one: StrokeTrajectory, plan: Floats, label: str, role: str, normal: Floats | None
 ) -> ReportedStroke:
     """Return one stroke of a file; `plan` holds the positions that it should follow, (n, 3), mm."""
     known, ends = one.facts, plan[[0, -1]]
@@ -165,7 +166,7 @@ def _aims(ends: Floats, heights: Floats, normal: Floats | None) -> Floats | None
     return None if normal is None else np.asarray(ends + heights[:, None] * normal[[0, -1]])
 
 
-def _side(one: StoredTrajectory) -> Floats | None:
+def _side(one: StrokeTrajectory) -> Floats | None:
     """Return the normal on the tool's side at the start, by the file or by its tool."""
     if one.normal is not None:
         return np.asarray(one.normal[0])

@@ -5,6 +5,7 @@ A preset is one TOML file with a section per command (``[record]``, ``[fit]``, .
 are refused by name. Presets that come with the program are addressed by name.
 """
 
+import difflib
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
@@ -210,7 +211,10 @@ def _first(
 
 def _of_option(kind: type[Settings], name: str, value: Any, message: str) -> str:
     """Say what an option must be; one that is also a TOML key as it would be written there."""
-    setting = next(one for one in settings_of(kind) if one.name == name)
+    setting = next((one for one in settings_of(kind) if one.name == name), None)
+    if setting is None:  # the command line has refused it before; a keyword comes so far
+        near = difflib.get_close_matches(name, [one.name for one in settings_of(kind)], 1)
+        return f"{name}: no such option" + "".join(f"; did you mean {one}?" for one in near)
     if setting.option is not None and setting.option.factor != 1.0:
         value /= setting.option.factor
     shown = number(value) if isinstance(value, float) else value

@@ -158,8 +158,12 @@ class Setting:
     def range(self) -> str:
         """What a value must be, in words; empty if there is no bound."""
         if self.choices:
-            words = [*self.choices]
+            words = [*self.choices, *([bounds] if (bounds := self._bounds) else [])]
             return " or ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+        return self._bounds
+
+    @property
+    def _bounds(self) -> str:
         factor = self.option.factor if self.option else 1.0
         bounds: dict[type, str] = {}
         for bound in self.ranges:

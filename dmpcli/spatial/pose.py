@@ -52,6 +52,12 @@ class Pose:
         back = np.swapaxes(self.rotation, -1, -2)
         return Pose(np.asarray(-(back @ self.position[..., None])[..., 0]), back)
 
+    def apart(self, other: "Pose") -> tuple[float, float]:
+        """Distance and angle from another pose, mm and rad; of single poses."""
+        turn = rotations.log(other.rotation @ self.rotation.T)
+        way = other.position - self.position
+        return float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+
     def apply(self, points: Floats) -> Floats:
         """Carry points (n, 3) of the frame, mm, out of it, shape (n, 3) or (B, n, 3)."""
         return np.asarray(points @ np.swapaxes(self.rotation, -1, -2) + self._beside)

@@ -1,10 +1,13 @@
 """A trajectory: where a tool is, or shall be, at which time."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,36 @@ class Trajectory:
         if self.normal is None or np.ptp(self.normal, axis=0).max() >= _LEVEL:
             return None
         return np.asarray(self.normal[0])
+
+
+@dataclass(frozen=True)
+class StrokeTrajectory(Trajectory):
+    """One stroke: a trajectory with its name, what is switched along it, and how hard it presses.
+
+    Attributes
+    ----------
+    id : str
+    first_row : int
+        Row of the file that holds the first sample, counted from 1.
+    facts : dict
+        What the file says beside it; of a batch, with the start, goal and normal of its pair.
+    events : tuple of OutputEvent
+        What is switched along it, on the time of `t`.
+    force : array, shape (T,), or None
+        Set-point of the force along the normal, N; 0 where the tool is lifted.
+    """
+
+    id: str = ""
+    first_row: int = 1
+    facts: dict[str, Any] = field(default_factory=dict)
+    events: tuple[OutputEvent, ...] = ()
+    force: Floats | None = None
+
+    def pose(self, index: int) -> Pose:
+        """Pose of a sample; the stroke must state an orientation."""
+        if self.rotation is None:
+            raise ValueError("this stroke states no orientation")
+        return Pose(self.position[index], self.rotation[index])
 
 
 _LEVEL = 1e-6

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dmpcli.admittance.force_coupling import Filter
 from dmpcli.control import (
     execution,
     execution_plan,
@@ -14,26 +13,23 @@ from dmpcli.control import (
     ownership,
     preflight_table,
     stopping,
-    stroke_file,
     watching,
     workcell,
 )
 from dmpcli.control.cycle import LoopOutcome, ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.goal_following import GoalFollower
 from dmpcli.control.servo_loop import PlanLoop, ServoLoop
-from dmpcli.control.stroke_file import StrokeSelection
 from dmpcli.control.workcell import Workcell
 from dmpcli.errors import InputError
 from dmpcli.instruments import clock as clocks
 from dmpcli.instruments.protocols import OutputSwitching, PlanPlayer
-from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import progress, tell, warn
 from dmpcli.planning.limits import limits_of
-from dmpcli.records import file_io, suffixes, tolerance_mark
+from dmpcli.records import file_io, stroke_selection, suffixes, tolerance_mark
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import RUN
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial.wrench import Tool
 from dmpcli.workflows import moving_goals
@@ -44,6 +40,11 @@ from dmpcli.workflows.run_output import (
     refuse_replacing,
 )
 from dmpcli.workflows.told_later import LaterTeller
+
+if TYPE_CHECKING:  # loaded where it is asked for
+    from dmpcli.admittance.force_coupling import Filter
+    from dmpcli.control.goal_following import GoalFollower
+    from dmpcli.kinematics.reachability import Reach
 
 
 @dataclass(frozen=True)
@@ -174,11 +175,15 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
     _warn_of(batch, _name(request.trajectory))
     # What weighs on the sensor counts only where there is one.
     held = _decoded(tool_file, weighed=request.sensor is not None)
-    first = batch.found[0]
+    first = batch.strokes[0]
     above = first.facts.get("end_heights", (0.0, 0.0))[0]
-    scene = execution.scene(first.stroke, request.presses, above)
+    scene = execution.scene(first, request.presses, above)
     weight = (held or scene.tool).weight
-    coupling = execution.coupling_of(batch, settings, weight) if request.presses else None
+    coupling = None
+    if request.presses:
+        from dmpcli.control import force_execution
+
+        coupling = force_execution.coupling_of(batch, settings, weight)
     realtime = request.realtime or not repeatable
     clock = clocks.MonotonicClock() if realtime else clocks.SimulatedClock()
     keeper = None
@@ -211,7 +216,7 @@ def execute(settings: ExecuteSettings, request: ExecutionRequest) -> Execution:
         arm = ReadyArm(robot, robot.open(), clock).as_told()
         lock.require_rest(robot, clock)
         guards.check_period(arm.info, settings.period, f"--period {settings.period:g}")
-        if coupling is not None and (late := execution.slowed(arm.info.lookahead)):
+        if coupling is not None and (late := force_execution.slowed(arm.info.lookahead)):
             warn(late)
         reach = execution.reach_of(bench.robot, request.robot_model, held)
         judged = _judged(batch, settings, arm, reach, request)
@@ -258,20 +263,22 @@ def _tell_of(loop: PlanLoop, realtime: bool) -> None:
     if realtime:
         tell(str(loop.timing))
     if loop.pressing is not None:
-        tell(execution.pressed(loop.pressing))
+        from dmpcli.control import force_execution
+
+        tell(force_execution.pressed(loop.pressing))
     if loop.goals is not None:
         tell(loop.goals.said())
 
 
 def _found(request: ExecutionRequest) -> StrokeSelection:
     """Return the strokes that are to be drawn, with the outputs that they are to switch."""
-    batch = stroke_file.find(request.trajectory, request.ids)
+    batch = stroke_selection.find(request.trajectory, request.ids)
     names = outputs.names_of(batch.strokes)
     if not request.ignore_events:
         return batch
     if names:
         warn(f"{', '.join(names)}: not switched, as --ignore-events asks")
-    return stroke_file.without_events(batch)
+    return batch.without_events()
 
 
 def _name(trajectory: str | Source) -> str:
@@ -286,7 +293,7 @@ def _warn_of(batch: StrokeSelection, name: str) -> None:
     """Warn of pairs without trajectory, and of a skill beyond its tolerance."""
     if batch.failed:
         warn(execution_plan.passed_over(batch.failed))
-    mark = tolerance_mark.of_facts(batch.found[0].facts)
+    mark = tolerance_mark.of_facts(batch.strokes[0].facts)
     if mark is not None:
         warn(tolerance_mark.text(name, mark))
 
@@ -295,11 +302,11 @@ def _judged(
     batch: StrokeSelection,
     settings: ExecuteSettings,
     arm: ReadyArm,
-    reach: Reach | None,
+    reach: "Reach | None",
     request: ExecutionRequest,
 ) -> list[CheckedPlan]:
     """Plan and check every stroke from where the arm stands."""
-    with progress("checking", len(batch.found)) as advance:
+    with progress("checking", len(batch.strokes)) as advance:
         return execution_plan.prepare(batch, settings, arm, request.presses, advance, reach)
 
 
@@ -334,23 +341,25 @@ def _loop(
     judged: list[CheckedPlan],
     settings: ExecuteSettings,
     request: ExecutionRequest,
-    coupling: Filter | None,
+    coupling: "Filter | None",
     tool_file: Source | None,
     keeper: RunOutput,
     batch: StrokeSelection,
     teller: LaterTeller,
-    goals: GoalFollower | None,
+    goals: "GoalFollower | None",
 ) -> PlanLoop:
     """Put the loop together; the sensor streams and its zero is known when it returns."""
     touch, plans = None, [one.plan for one in judged]
     if request.sensor is not None:
+        from dmpcli.control import force_execution
+
         tool = _tool(bench, tool_file)
         # The mock's own tool needs no check; a file's may be another tool's.
         check = None if tool_file is None else settings.tool_check
         policy = None
         if coupling is not None:
-            policy = execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
-        touch = execution.touch(
+            policy = force_execution.policy_of(batch, settings, arm.info.lookahead, tool.weight)
+        touch = force_execution.touch(
             bench.sensor, tool, plans[0], settings, arm, coupling, check, policy, teller.contact
         )
     watch = execution.watch(settings)
@@ -401,8 +410,8 @@ def _provenance(
         options["id"] = list(request.ids) or None
         facts |= execution_plan.facts_of(batch)
     else:
-        options["id"] = batch.found[0].stroke.id
-        facts["trajectory"] = batch.found[0].facts
+        options["id"] = batch.strokes[0].id
+        facts["trajectory"] = batch.strokes[0].facts
     return Provenance("execute", options, tuple(inputs), facts)
 
 
@@ -411,7 +420,7 @@ def _stream(
     provenance: Provenance,
     realtime: bool,
     keeper: RunOutput,
-    reach: Reach | None,
+    reach: "Reach | None",
 ) -> tuple[LoopOutcome, Record | None]:
     """Run the loop and write what it logged, whatever ended it."""
     outcome, made = LoopOutcome("a defect of dmpcli"), None

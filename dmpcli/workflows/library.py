@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from dmpcli.arrays import Floats
 from dmpcli.dmp.drawn_strokes import OnBorder
 from dmpcli.dmp.rollout import Pairs
+from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
-from dmpcli.records import file_io, learned_skill, record, recordings, schemas
+from dmpcli.records import file_io, learned_skill, record, recordings, schemas, suffixes
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.pairs import FARTHEST, PairTable
 from dmpcli.records.schemas import OK
@@ -27,11 +28,13 @@ from dmpcli.settings.layers import resolve
 from dmpcli.settings.options import Given
 from dmpcli.settings.recording import RecordingOptions
 from dmpcli.spatial.rotations import to_euler
+from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import batches, process, single, surface_input, values
 from dmpcli.workflows.fit import check_said, learn
 from dmpcli.workflows.generalize import Order, prepared
 from dmpcli.workflows.generalize_inputs import one_pair
+from dmpcli.workflows.given_arrays import real, rotations
 from dmpcli.workflows.ranges import within
 from dmpcli.workflows.recording import with_force
 from dmpcli.workflows.surface_input import SurfaceInput
@@ -62,6 +65,7 @@ def read(path: str | Path, **said: Any) -> Any:
     InputError
         It cannot be read.
     """
+    layout = resolve(RecordingOptions, said).as_layout()
     if str(path) != file_io.DASH and (folder := located(path)).is_dir():
         return values.batch_in(folder)
     source = file_io.read(path)
@@ -75,7 +79,7 @@ def read(path: str | Path, **said: Any) -> Any:
             return values.of_run(found, source)
         if found.schema is not schemas.DEMONSTRATION:
             raise InputError(f"{path}: is a {found.schema.name} file, which holds no stroke")
-    return values.demonstration(source, resolve(RecordingOptions, said).as_layout())
+    return values.demonstration(source, layout)
 
 
 def write(value: Any, path: str | Path) -> None:
@@ -97,7 +101,8 @@ def write(value: Any, path: str | Path) -> None:
             raise InputError(f"{path}: this batch was read from a folder; copy that one")
         batches.write(value.ready, located(path), BatchOptions(on_error="skip"))
         return
-    file_io.write(path, values.source_of(value, str(path)).content)
+    suffixes.check(str(path), suffixes.JSON if isinstance(value, Skill) else suffixes.PARQUET)
+    file_io.write(path, values.written(value, str(path)))
 
 
 def read_surface(
@@ -149,9 +154,15 @@ def fit(
         As ``dmpcli fit``.
     """
     several = demonstrations
-    several = [several] if isinstance(several, Demonstration) else list(several)
+    several = [several] if isinstance(several, Trajectory | str | Path) else list(several)
     if not several:
         raise InputError("there is no demonstration to learn from; give at least one")
+    for one in several:
+        if not isinstance(one, Demonstration):
+            raise InputError(
+                f"{type(one).__name__} is no Demonstration; `read` a file, or make one of arrays: "
+                "Demonstration(t, position, rotation)"
+            )
     check_said(settings, surface is not None)
     resolved = resolve(FitSettings, settings, preset)
     files = [one.file() for one in several]
@@ -194,7 +205,7 @@ def generalize(
     skill : Skill
         Of `fit` or `read`.
     start, goal : array, shape (3,) or (B, 3)
-        mm.
+        mm; one point beside many stands for all of them.
     surface : Surface, optional
         What to draw on.
     start_rotation, goal_rotation : array, shape (3, 3) or (B, 3, 3), optional
@@ -214,29 +225,35 @@ def generalize(
     InputError, RefusedError
         As ``dmpcli generalize``; of a pair among many its status says it.
     """
+    if not isinstance(skill, LearnedSkill):
+        raise InputError(f"{type(skill).__name__} is no skill; `read` or `fit` gives one")
     resolved = resolve(GeneralizeSettings, settings, preset)
     lines = None if keep_out is None else Path(keep_out)
     named = _named(surface)
     process.check(resolved, Given(settings), _path_of(named), lines)
     first, last = _points("start", start), _points("goal", goal)
-    if first.shape != last.shape:
+    if first.ndim == last.ndim and first.shape != last.shape:
         raise InputError(f"start and goal: shapes {first.shape} and {last.shape} differ")
-    within("--start", first.ravel().tolist(), FARTHEST)
-    within("--goal", last.ravel().tolist(), FARTHEST)
-    rotations = [
-        _rotations(name, R, first.shape[:-1])
+    first, last = np.broadcast_arrays(first, last)
+    turns = [
+        None if R is None else rotations(name, R, first.shape[:-1])
         for name, R in (("start_rotation", start_rotation), ("goal_rotation", goal_rotation))
     ]
     options: dict[str, Any] = {}
     if first.ndim == 1:
-        angles = [None if R is None else tuple(to_euler(R).tolist()) for R in rotations]
+        within("--start", first.tolist(), FARTHEST)
+        within("--goal", last.tolist(), FARTHEST)
+        angles = [None if R is None else tuple(to_euler(R).tolist()) for R in turns]
         table = one_pair(tuple(first.tolist()), tuple(last.tolist()), *angles)
         options = dict(zip(("start_orientation", "goal_orientation"), angles, strict=True))
     else:
         count = len(first)
         ids = [str(i + 1) for i in range(count)]
-        pairs = Pairs(first, last, *rotations)
-        table = PairTable(MANY, ids, pairs, None, np.full(count, np.nan), [OK] * count)
+        pairs = Pairs(first.copy(), last.copy(), *turns)
+        status = [
+            _doubt(i, one, other) for i, (one, other) in enumerate(zip(first, last, strict=True))
+        ]
+        table = PairTable(MANY, ids, pairs, None, np.full(count, np.nan), status)
         options = BatchOptions(on_error="skip").as_options()
     order = Order(
         skill,
@@ -258,7 +275,11 @@ def generalize(
 
 
 def _named(surface: Surface | None) -> SurfaceInput | None:
-    return None if surface is None else surface_input.remembered(surface)
+    if surface is None:
+        return None
+    if isinstance(surface, str | Path):
+        raise InputError(f"surface: {surface} is a name; `read_surface` reads the file")
+    return surface_input.remembered(surface)
 
 
 def _path_of(named: SurfaceInput | None) -> Location | None:
@@ -266,18 +287,17 @@ def _path_of(named: SurfaceInput | None) -> Location | None:
 
 
 def _points(name: str, given: ArrayLike) -> Floats:
-    points = np.asarray(given, dtype=float)
+    points = real(name, given)
     if points.ndim not in (1, 2) or points.shape[-1] != 3:
         raise InputError(f"{name}: shape {points.shape} is neither (3,) nor (B, 3)")
     return points
 
 
-def _rotations(name: str, given: ArrayLike | None, lead: tuple[int, ...]) -> Floats | None:
-    if given is None:
-        return None
-    R = np.asarray(given, dtype=float)
-    if R.shape != (*lead, 3, 3):
-        raise InputError(f"{name}: shape {R.shape} is not {(*lead, 3, 3)}")
-    if np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max() > 1e-6 or (np.linalg.det(R) < 0).any():
-        raise InputError(f"{name}: is no rotation")
-    return R
+def _doubt(row: int, start: Floats, goal: Floats) -> str:
+    """Say what is wrong with one of many pairs, as its status."""
+    try:
+        within(f"start[{row}]", start.tolist(), FARTHEST)
+        within(f"goal[{row}]", goal.tolist(), FARTHEST)
+    except InputError as error:
+        return str(error)
+    return OK

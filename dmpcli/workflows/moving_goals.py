@@ -2,24 +2,24 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dmpcli.arrays import Floats
-from dmpcli.control import goal_following
-from dmpcli.control.goal_following import GoalFollower, GoalOptions
-from dmpcli.control.stroke_file import StrokeSelection
-from dmpcli.dmp.goal_step import GoalFilter
 from dmpcli.errors import InputError
-from dmpcli.instruments import goal_sources
-from dmpcli.instruments.goal_sources import GoalSource, ScheduledGoals
 from dmpcli.instruments.protocols import PlanPlayer, Servo
-from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning.limits import limits_of
 from dmpcli.planning.plan import Plan
-from dmpcli.records import file_io, goal_table
+from dmpcli.records import file_io
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, input_of
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
+
+if TYPE_CHECKING:  # loaded where goals are asked for
+    from dmpcli.control.goal_following import GoalFollower
+    from dmpcli.dmp.goal_step import GoalFilter
+    from dmpcli.instruments.goal_sources import GoalSource, ScheduledGoals
+    from dmpcli.kinematics.reachability import Reach
 
 _UDP = "udp:"
 
@@ -42,8 +42,8 @@ class Asked:
 
     said: str
     file: Source | None
-    schedule: ScheduledGoals | None
-    filter: GoalFilter
+    schedule: "ScheduledGoals | None"
+    filter: "GoalFilter"
     normal: Floats
 
 
@@ -80,6 +80,8 @@ class MovingGoals:
         InstrumentError
         """
         if self._asked is not None:
+            from dmpcli.instruments import goal_sources
+
             self._source = self._asked.schedule or goal_sources.datagrams(self._asked.said)
 
     def close(self) -> None:
@@ -91,9 +93,9 @@ class MovingGoals:
         self,
         plan: Plan,
         settings: ExecuteSettings,
-        reach: Reach | None,
+        reach: "Reach | None",
         tell: Callable[[str], None],
-    ) -> GoalFollower | None:
+    ) -> "GoalFollower | None":
         """Return what the loop asks each cycle.
 
         Raises
@@ -104,6 +106,8 @@ class MovingGoals:
         asked = self._asked
         if asked is None or self._source is None:
             return None
+        from dmpcli.control.goal_following import GoalFollower, GoalOptions
+
         options = GoalOptions(limits_of(settings), reach, settings.goal_range, tell)
         return GoalFollower(self._source, plan, asked.filter, asked.normal, options)
 
@@ -135,17 +139,23 @@ def wanted(said: str | None, batch: StrokeSelection, settings: ExecuteSettings) 
     """
     if said is None:
         return MovingGoals()
-    if len(batch.found) > 1:
+    if len(batch.strokes) > 1:
         raise InputError(
-            f"--goal-from: moves the goal of one stroke, and {len(batch.found)} are to be drawn; "
+            f"--goal-from: moves the goal of one stroke, and {len(batch.strokes)} are to be drawn; "
             "name one with --id"
         )
-    found = batch.found[0]
-    normal = goal_following.plane_of(found.stroke, found.facts)
-    filter_ = goal_following.filter_of(found.facts, settings.speed, settings.period)
+    from dmpcli.control import goal_following
+    from dmpcli.instruments import goal_sources
+    from dmpcli.instruments.goal_sources import ScheduledGoals
+
+    stroke = batch.strokes[0]
+    normal = goal_following.plane_of(stroke)
+    filter_ = goal_following.filter_of(stroke.facts, settings.speed, settings.period)
     if said.startswith(_UDP):
         goal_sources.check(said)
         return MovingGoals(Asked(said, None, None, filter_, normal))
+    from dmpcli.records import goal_table
+
     file = file_io.read(said)
     schedule = ScheduledGoals(file.name, *goal_table.read(file))
     return MovingGoals(Asked(said, file, schedule, filter_, normal))

@@ -118,6 +118,11 @@ def wave_heights(stroke: Trajectory) -> Floats:
     stroke : Demonstration, Trajectory or Run
         A demonstration is seen as `fit` sees it.
     """
+    if not isinstance(stroke, Trajectory) or isinstance(stroke, TrajectoryBatch):
+        raise InputError(
+            f"{type(stroke).__name__} is no trajectory; of a batch give one by one, of arrays a "
+            "Trajectory(t, position)"
+        )
     return values.measured(stroke).wave.heights
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, overload
 
 from dmpcli.control.execution_plan import CheckedPlan
+from dmpcli.errors import InputError
 from dmpcli.records import record as records
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Record
@@ -132,7 +133,7 @@ def execute(
         elif isinstance(trajectory, TrajectoryBatch):
             given = str(stack.enter_context(values.folder_of(trajectory)))
         else:
-            given = values.source_of(trajectory)
+            given = _drawn(trajectory)
         request = ExecutionRequest(
             given,
             (id,) if isinstance(id, str) else tuple(id),
@@ -153,6 +154,12 @@ def execute(
     if done.run is None:
         return done.checked
     return values.of_run(_whole(done.run))
+
+
+def _drawn(value: Any) -> Source:
+    if not isinstance(value, Trajectory):
+        raise InputError(f"{type(value).__name__} is no trajectory; `generalize` draws one")
+    return values.source_of(value)
 
 
 def _path(name: str | Path | None) -> Path | None:

@@ -2,9 +2,12 @@
 
 import queue
 import threading
+from typing import TYPE_CHECKING
 
-from dmpcli.control.contact_policy import ContactEvent
 from dmpcli.messages import warn
+
+if TYPE_CHECKING:
+    from dmpcli.control.contact_policy import ContactEvent
 
 _TOLD = ("lost", "too hard", "oscillating")
 
@@ -32,7 +35,7 @@ class LaterTeller:
         else:
             self._queue.put(text)
 
-    def contact(self, event: ContactEvent) -> None:
+    def contact(self, event: "ContactEvent") -> None:
         """Tell how a contact has changed, if a person should know of it now."""
         if event.state in _TOLD or event.detail.startswith("saturated"):
             self.say(str(event))

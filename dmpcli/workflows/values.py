@@ -22,15 +22,16 @@ from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.record import Provenance, Record
 from dmpcli.records.schemas import OK
 from dmpcli.records.storage import Location
-from dmpcli.records.trajectory_reader import StoredTrajectory, rows_by_id, stored
+from dmpcli.records.trajectory_reader import rows_by_id, stored
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.spatial.rotations import from_euler, to_euler
-from dmpcli.spatial.trajectory import Trajectory
+from dmpcli.spatial.trajectory import StrokeTrajectory, Trajectory
 from dmpcli.workflows import batches
 from dmpcli.workflows.generalize import Ready
+from dmpcli.workflows.given_arrays import real, rotations
 from dmpcli.workflows.recording import recording
 
 
@@ -44,10 +45,26 @@ class Demonstration(Trajectory):
         The file that it was read from.
     layout : Layout, optional
         How that is read, where it is not dmpcli's own.
+
+    Raises
+    ------
+    InputError
+        The arrays are not of real numbers, of the shapes (T,), (T, 3) and (T, 3, 3); or a matrix
+        is no rotation.
     """
 
     source: Source | None = field(default=None, repr=False, compare=False)
     layout: Layout | None = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        t, position = real("t", self.t), real("position", self.position)
+        if t.ndim != 1 or position.shape != (len(t), 3):
+            raise InputError(
+                f"t and position: shapes {t.shape} and {position.shape} are not (T,), (T, 3)"
+            )
+        R = None if self.rotation is None else rotations("rotation", self.rotation, t.shape)
+        for name, value in (("t", t), ("position", position), ("rotation", R)):
+            object.__setattr__(self, name, value)
 
     def file(self) -> Source:
         """Return its file; of arrays the one that they would be written as."""
@@ -59,7 +76,7 @@ class Demonstration(Trajectory):
 
 
 @dataclass(frozen=True)
-class DrawnTrajectory(StoredTrajectory):
+class DrawnTrajectory(StrokeTrajectory):
     """A trajectory with the record that it is written as, and the file that it was read from."""
 
     record: Record | None = field(default=None, repr=False, compare=False)
@@ -234,16 +251,14 @@ def _padded(strokes: list[Trajectory | None], ids: list[str], status: list[str])
 
 
 def _columns(one: Trajectory) -> dict[str, Any]:
-    t, position = np.asarray(one.t, dtype=float), np.asarray(one.position, dtype=float)
+    t, position = real("t", one.t), real("position", one.position)
     if t.ndim != 1 or position.shape != (len(t), 3):
         raise InputError(
             f"t and position: shapes {t.shape} and {position.shape} are not (T,), (T, 3)"
         )
     columns: dict[str, Any] = {"t": t, **dict(zip(schemas.POSITION, position.T, strict=True))}
     if one.rotation is not None:
-        R = np.asarray(one.rotation, dtype=float)
-        if R.shape != (len(t), 3, 3):
-            raise InputError(f"rotation: shape {R.shape} is not {(len(t), 3, 3)}")
+        R = rotations("rotation", one.rotation, t.shape)
         angles = np.unwrap(to_euler(R), axis=0)
         columns |= dict(zip(schemas.EULER_ANGLES, angles.T, strict=True))
     return columns
@@ -260,7 +275,7 @@ def record_of(one: Trajectory) -> Record:
     if one.normal is not None:
         rows = np.broadcast_to(one.normal, (len(columns["t"]), 3))
         columns |= dict(zip(schemas.NORMAL, rows.T.copy(), strict=True))
-    if isinstance(one, StoredTrajectory) and one.force is not None:
+    if isinstance(one, StrokeTrajectory) and one.force is not None:
         columns["fn"] = one.force
     return Record(schemas.TRAJECTORY, columns, Provenance("write"))
 
@@ -291,7 +306,27 @@ def source_of(value: Any, path: str = "") -> Source:
     if isinstance(value, Trajectory):
         made = record_of(value)
         return Source(made.name or made.schema.name, record.encode(made))
-    raise InputError(f"{name}a {type(value).__name__} is nothing that can be written")
+    kind = type(value).__name__
+    raise InputError(f"{name}{kind} is no demonstration, skill, trajectory, batch or run")
+
+
+def written(value: Any, path: str) -> bytes:
+    """Return what a file of a value holds; a recording of another program becomes one of ours.
+
+    Parameters
+    ----------
+    value : Demonstration, LearnedSkill, Trajectory or Run
+    path : str
+        What a message is to name.
+
+    Raises
+    ------
+    InputError
+        It is none of them.
+    """
+    if isinstance(value, Demonstration) and value.layout is not None:
+        return Demonstration(value.t, value.position, value.rotation).file().content
+    return source_of(value, path).content
 
 
 @contextlib.contextmanager

@@ -50,6 +50,7 @@ def test_the_external_wrench_comes_back_under_any_attitude(seed):
     np.testing.assert_allclose(found, external, atol=1e-10)
 
 
+@pytest.mark.slow
 @given(seeds)
 def test_a_zero_taken_at_rest_holds_in_every_other_attitude(seed):
     rng = np.random.default_rng(seed)

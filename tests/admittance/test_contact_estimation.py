@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import linregress
 
 from dmpcli.admittance.contact_estimation import (
     RiseTest,
@@ -19,6 +18,8 @@ from dmpcli.admittance.contact_estimation import (
 @settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(3, 12))
 def test_a_line_is_that_of_least_squares_with_its_standard_error(seed, n):
+    from scipy.stats import linregress
+
     rng = np.random.default_rng(seed)
     depth = np.cumsum(rng.uniform(0.01, 0.3, n))
     force = 3.0 * depth + 0.2 * rng.standard_normal(n)

@@ -1,6 +1,7 @@
 """The closed loop as a matrix, against its parts one by one: law, filter, arm by its equations."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
@@ -68,6 +69,7 @@ class Loop:
         self.sent.pop()
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.booleans(), st.integers(0, 45))
 def test_a_cycle_of_the_matrix_is_one_of_the_loop_part_by_part(seed, integrates, steps):

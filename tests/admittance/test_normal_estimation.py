@@ -39,6 +39,7 @@ WAVE = np.column_stack([-10.0 * T, 25.0 * np.sin(2 * np.pi * T / 10.0)])
 LINE = np.column_stack([-15.0 * T, 0.0 * T])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [WAVE, LINE], ids=["wave", "line"])
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 5.0])
 @pytest.mark.parametrize("about", [0.0, 90.0, 200.0])
@@ -168,6 +169,7 @@ class Textbook:
         return made / np.linalg.norm(made)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(0, 10_000), st.sampled_from([0.05, 3.0]))
 def test_it_is_the_textbooks_filter_of_the_three_equations(seed, noise):

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import distributed
-
 PATIENCE = 120.0
 
 
@@ -34,6 +32,8 @@ class Cluster:
 
     def add(self) -> subprocess.Popen[bytes]:
         """Begin one more worker, in a folder of its own, and wait until it is there."""
+        import distributed
+
         here = self.place / f"worker-{len(self.workers)}"
         here.mkdir()
         words = ["--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", here]
@@ -53,6 +53,8 @@ def begun(what: str, *words: Any, **said: Any) -> subprocess.Popen[bytes]:
 @contextlib.contextmanager
 def cluster(place: Path, environment: dict[str, str]) -> Any:
     """Run a scheduler without workers."""
+    import distributed
+
     place.mkdir()
     file = place / "scheduler.json"
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file]

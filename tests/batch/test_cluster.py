@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import distributed
 import pytest
 
 from dmpcli.batch import cluster
@@ -31,6 +30,8 @@ __all__ = ["learned"]
 @pytest.fixture
 def scheduler(tmp_path):
     """Address of a scheduler with two worker processes."""
+    import distributed
+
     file = tmp_path / "scheduler.json"
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -123,7 +124,7 @@ def test_a_worker_of_another_version_that_comes_later_is_refused_by_name(monkeyp
     assert cluster._brought(JOB, ours, "w") is JOB
     refusal = cluster._brought(JOB, ours | {"numpy": "1.0"}, "late")
     assert refusal == f"worker late has numpy {ours['numpy']}, here it is 1.0; install the same"
-    monkeypatch.setattr(distributed, "get_worker", lambda: SimpleNamespace(job=refusal))
+    monkeypatch.setattr("distributed.get_worker", lambda: SimpleNamespace(job=refusal))
     with pytest.raises(InputError, match="worker late has numpy"):
         cluster._draw("job", None)
 
@@ -173,7 +174,7 @@ class Completed(list):
 def test_what_ends_a_cluster_on_the_way_is_told_in_one_line(
     tmp_path, monkeypatch, error, code, said
 ):
-    monkeypatch.setattr(distributed, "as_completed", Completed)
+    monkeypatch.setattr("distributed.as_completed", Completed)
     client, job = LostClient(error), replace(JOB, folder=str(tmp_path))
     with pytest.raises((InputError, InstrumentError), match=said) as told:
         list(cluster._drawn(client, "tcp://x:1", job, [None]))

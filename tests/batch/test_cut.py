@@ -17,6 +17,7 @@ def test_without_surfaces_the_order_is_that_of_the_table(rows, size):
     np.testing.assert_array_equal(joined, np.arange(rows))
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(st.integers(-1, 6), st.sampled_from([0.0, 1.5])), min_size=1, max_size=80),
     st.integers(1, 9),

@@ -58,6 +58,7 @@ def put(store, path, key):
     return f"s3://{BUCKET}/{key}"
 
 
+@pytest.mark.slow
 def test_a_batch_of_a_store_has_the_bytes_of_one_of_a_folder(learned, whole, store):
     table, files = whole
     skill, pairs = put(store, learned, "in/s.json"), put(store, table, "in/p.csv")
@@ -161,6 +162,7 @@ def test_a_store_that_has_no_time_ends_the_run_and_the_next_one_goes_on(
     assert store.objects("b/") == files
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("output", "environment", "code", "said"),
     [

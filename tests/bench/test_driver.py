@@ -165,6 +165,7 @@ def execute(*arguments, expect=0):
     return result.stderr
 
 
+@pytest.mark.slow
 def test_execute_draws_on_it_and_keeps_what_truly_happened(stroke, tmp_path):
     contents, truths = [], []
     for name in ("one", "two"):

@@ -494,6 +494,7 @@ def test_what_is_taught_on_a_curved_part_is_drawn_on_any(lab, saddle, taught):
         assert not warnings(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["on_saddle 0", "on_saddle 40", "on_bow 600"])
 def test_what_would_dig_into_another_surface_is_refused_with_remedies(lab, name):
     kind, number = name.split()

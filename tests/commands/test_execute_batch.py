@@ -361,6 +361,7 @@ def test_a_stroke_that_finds_no_contact_ends_the_run_and_says_what_is_left(batch
 # --- what stops a run
 
 
+@pytest.mark.slow
 def test_after_an_emergency_stop_the_rest_is_named_and_can_be_drawn(batch, tmp_path):
     out, rest = tmp_path / "run.parquet", tmp_path / "rest.parquet"
     said = execute(batch, "-o", out, "--robot", "mock:?estop_at=14", expect=3).stderr

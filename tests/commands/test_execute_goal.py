@@ -59,6 +59,7 @@ def test_the_report_measures_a_stroke_against_the_goal_that_it_was_led_to(traj, 
     np.testing.assert_allclose(row["goal"], [-665.0, 125.0, -17.56], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_pressed_the_goal_moves_along_the_plane_and_the_force_is_held(traj, goals, tmp_path):
     out = tmp_path / "run.parquet"
     pressed = ["--coupling", "force", "--clearance", "25"]

@@ -4,7 +4,6 @@ import json
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -17,6 +16,8 @@ run = partial(invoke, "fit")
 
 @pytest.fixture
 def recording(tmp_path):
+    import pandas as pd
+
     stroke = paper_stroke()
     frame = pd.DataFrame(np.column_stack([stroke.t, stroke.position]), columns=list("txyz"))
     frame.to_csv(tmp_path / "demo.csv", index=False)
@@ -57,6 +58,8 @@ def test_the_original_model_says_which_axes_go_without_the_factor(recording, tmp
 
 
 def test_other_recorders_are_read_by_layout(recording, tmp_path):
+    import pandas as pd
+
     frame = pd.read_csv(recording)
     frame[["x", "y", "z"]] /= 1000.0
     frame.columns = ["timestamp", *(f"actual_TCP_pose_{i}" for i in range(3))]
@@ -174,6 +177,8 @@ def test_the_ends_of_every_range_fit_to_finite_weights(recording, tmp_path, opti
 @pytest.fixture
 def pressed(tmp_path):
     """A stroke of 10 s drawn in contact, pressed from 3 to 8 N and back by a pen of 2 N/mm."""
+    import pandas as pd
+
     stroke = paper_stroke()
     force = 3.0 + 5.0 * np.sin(np.pi * stroke.t / 10.0) ** 2
     frame = pd.DataFrame(np.column_stack([stroke.t, stroke.position]), columns=list("txyz"))
@@ -191,6 +196,8 @@ def pressed(tmp_path):
 def test_a_force_profile_goes_from_the_recording_through_the_skill_into_the_trajectory(
     pressed, tmp_path
 ):
+    import pandas as pd
+
     file, force = pressed
     skill, out = tmp_path / "s.json", tmp_path / "t.parquet"
     normal = ("--normal", 0, 0, 1)

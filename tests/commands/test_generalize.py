@@ -4,7 +4,6 @@ import json
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -300,6 +299,8 @@ def test_an_older_batch_stays_whole_when_a_new_one_is_refused(learned, tmp_path)
 
 
 def test_pairs_may_be_parquet(learned, tmp_path):
+    import pandas as pd
+
     frame = pd.DataFrame([[0.0, 0, 0, 90, 0, 0]], columns=["x0", "y0", "z0", "xg", "yg", "zg"])
     frame.to_parquet(tmp_path / "p.parquet")
     done = run(learned, "-o", tmp_path / "batch", "--pairs", tmp_path / "p.parquet")

@@ -72,6 +72,7 @@ def executes(path):
     return CliRunner().invoke(cli.app, ["execute", str(path), "-o", "run.parquet", "--dry-run"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", ["plane.json", "cylinder.json", "sphere.json", "plate.ply"])
 def test_copies_lie_beside_the_first_at_their_spacing_along_the_surface(shop, tmp_path, surface):
     y = -35.0

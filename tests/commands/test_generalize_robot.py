@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from dmpcli.kinematics import chain, models
@@ -31,8 +30,8 @@ def tool_file(path, length):
 
 def pair_table(path, offsets):
     start, goal = np.array(PAIR[1:4], dtype=float), np.array(PAIR[5:8], dtype=float)
-    rows = [[*(start + [x, 0, 0]), *(goal + [x, 0, 0])] for x in offsets]
-    pd.DataFrame(rows, columns=["x0", "y0", "z0", "xg", "yg", "zg"]).to_csv(path, index=False)
+    rows = [",".join(map(str, [*(start + [x, 0, 0]), *(goal + [x, 0, 0])])) for x in offsets]
+    path.write_text("\n".join(["x0,y0,z0,xg,yg,zg", *rows, ""]))
     return path
 
 

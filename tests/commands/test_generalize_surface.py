@@ -70,6 +70,7 @@ def test_the_original_model_leaves_the_curved_surface(tmp_path):
     assert not found.has("nx", "ny", "nz")
 
 
+@pytest.mark.slow
 def test_a_placed_part_and_pair_give_the_placed_stroke(learned, tmp_path):
     pose = [30.0, -20.0, 15.0, 0.1, -0.2, 0.6]
     R, shift = rotations.from_euler(np.array(pose[3:])), np.array(pose[:3])
@@ -131,6 +132,7 @@ def test_solids_that_share_an_edge_are_drawn_on_but_not_across_it(tmp_path):
     assert not (tmp_path / "u").exists()
 
 
+@pytest.mark.slow
 def test_a_stroke_over_the_border_is_refused_or_clipped(learned, tmp_path):
     edge = ["--start", -551.0, 180.0, -17.54, "--goal", -660.0, 180.0, -17.54]  # it ends at 185
     surface = ["--surface", BENCH]

@@ -102,6 +102,7 @@ def test_no_number_lacks_its_unit():
     assert seen > 90
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", ["80", "200"])
 def test_summaries_are_whole_and_lines_take_the_width_of_the_terminal(columns):
     def shown(*words):

@@ -299,6 +299,7 @@ def test_our_own_demonstrations_are_read_likewise(tmp_path):
     assert told["rate"] == pytest.approx(50.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(FILES))
 def test_every_known_recorder_is_inspected_by_its_word(tmp_path, name):
     layout, text = FILES[name]

@@ -25,6 +25,7 @@ def ends(*words, expect=4):
     return done.stderr.strip().splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["mock:", "mock:?estop_at=2.5", "mock:?refuse_at=2.5"])
 @pytest.mark.parametrize("command", ["execute", "record"])
 def test_it_is_the_last_line_with_exit_code_4_and_stands_in_the_file(

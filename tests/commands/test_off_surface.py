@@ -70,6 +70,7 @@ DEGREES = [*SIX[:3], *np.degrees(SIX[3:])]
 METRES = [*(np.array(SIX[:3]) / 1000.0), *SIX[3:]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("args", "hint"),
     [

@@ -98,6 +98,7 @@ def test_a_period_that_the_robot_does_not_take_is_refused_before_streaming(
     assert "streaming" not in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("monitor", "words"),
     [

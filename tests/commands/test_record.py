@@ -402,6 +402,7 @@ def test_every_mistake_has_one_of_the_exit_codes():
     assert all(issubclass(e, DmpError) for e in (InputError, RefusedError, InstrumentError))
 
 
+@pytest.mark.slow
 def test_recording_imports_nothing_that_it_does_not_need(tmp_path):
     script = (
         "import sys, typer; from dmpcli.commands import record; "

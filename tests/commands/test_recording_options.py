@@ -41,6 +41,7 @@ READ = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READ)
 def test_fit_and_report_read_the_same_stroke_by_the_same_options(tmp_path, name):
     text, options = READ[name]

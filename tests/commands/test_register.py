@@ -197,6 +197,7 @@ def assert_wedge(folder):
     assert error <= file.conditioning.uncertainty
 
 
+@pytest.mark.slow
 def test_without_a_guess_all_orientations_are_searched(wedge_lab):
     done = run("wedge.stl", "on.csv", "-o", "pose.json", "--guess", "none")
     assert done.exit_code == 0, done.stderr

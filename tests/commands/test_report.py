@@ -207,6 +207,7 @@ def test_a_small_batch_is_listed_by_id(tmp_path):
     assert entry["states"] == {"ok": 4, "too steep": 1}
 
 
+@pytest.mark.slow
 def test_a_large_batch_is_reported_by_statistics(tmp_path, files):
     folder = batch(tmp_path / "many", 24)
     entry = document(files["demo"], folder)["files"][1]

@@ -92,6 +92,7 @@ def test_without_a_demonstration_the_worst_height_is_farthest_from_the_median(tm
     assert entry_of(folder)["worst"]["wave_height"][0]["id"] == "30"
 
 
+@pytest.mark.slow
 def test_failures_are_counted_by_reason(demo, folder):
     entry = entry_of(demo, folder)
     assert [(row["count"], row["first"]) for row in entry["failures"]] == [

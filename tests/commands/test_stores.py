@@ -132,6 +132,7 @@ def test_json_of_generalize_describes_what_lies_in_the_store(store, tmp_path):
     assert said["output"]["found"]["file"] == "t.parquet"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -6,8 +6,10 @@ from dmpcli.control.run_log import Row
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import Plan, PlannedStroke, make
+from dmpcli.planning.plan import Plan, make
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.minimum_jerk import minimum_jerk
 
 PEN_DOWN = from_euler(np.array([np.pi, 0.0, 0.0]))
@@ -30,13 +32,13 @@ def stroke(duration=10.0, rate=50.0, turn=0.0, rotated=True, normal=None, first_
     angles = np.zeros((n + 1, 3))
     angles[:, 0] = np.pi
     angles[:, 2] = turn * minimum_jerk(t / duration)
-    return PlannedStroke(
-        "0",
+    return StrokeTrajectory(
         t,
         sine(t, duration),
         from_euler(angles) if rotated else None,
         None if normal is None else np.broadcast_to(np.asarray(normal, float), (n + 1, 3)),
-        first_row,
+        first_row=first_row,
+        id="0",
     )
 
 
@@ -44,7 +46,7 @@ def plan(source=None, period=0.02, speed=1.0, start=None, approach=20.0, limits=
     source = stroke() if source is None else source
     if start is None:
         held = PEN_DOWN if source.rotation is None else source.rotation[0]
-        start = (source.position[0], held)
+        start = Pose(source.position[0], held)
     return make(source, period, speed, limits, start, approach)
 
 

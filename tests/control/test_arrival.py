@@ -11,9 +11,10 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning import transfers
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp_one
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, plan
 
 WATCH = StopLimits(5.0, 0.1, 50.0, 5.0)
@@ -25,7 +26,7 @@ def made(way, turn=None, name="0"):
     rotation = np.broadcast_to(PEN_DOWN, (101, 3, 3))
     if turn is not None:
         rotation = np.array([exp_one(np.array([0.0, 0.0, a])) @ PEN_DOWN for a in turn])
-    return PlannedStroke(name, T, START + way, rotation, np.tile([0.0, 0.0, 1.0], (101, 1)))
+    return StrokeTrajectory(T, START + way, rotation, np.tile([0.0, 0.0, 1.0], (101, 1)), id=name)
 
 
 def line(length):
@@ -115,7 +116,7 @@ def test_an_arm_that_rests_beside_its_end_has_not_arrived(off, turn, words):
 
 def tour(*strokes):
     ways = TransferOptions(3.0, 100.0, 50.0, 20.0, settling=10)
-    start = (START, PEN_DOWN)
+    start = Pose(START, PEN_DOWN)
     return list(transfers.plans(strokes, 0.02, 1.0, WIDE, start, True, ways))
 
 
@@ -193,7 +194,7 @@ def test_a_stroke_that_hardly_leads_anywhere_needs_no_beginning():
 
 
 def test_what_lies_before_the_stroke_is_no_beginning_of_it():
-    drawn = plan(made(line(4.0)), start=(START - [9.0, 0.0, 0.0], PEN_DOWN))
+    drawn = plan(made(line(4.0)), start=Pose(START - [9.0, 0.0, 0.0], PEN_DOWN))
     monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
     monitor.see(at(drawn.position[0]), 0)
     monitor.see(at(START), drawn.lead)
@@ -209,7 +210,7 @@ def test_it_has_arrived_within_its_tolerances_and_rests_there(off, turn, near):
     drawn = plan(made(line(4.0)))
     monitor = ArrivalMonitor(drawn, 1.0, 0.0175)
     end = drawn.at(drawn.last)
-    state = at(end[0] + [0.0, off, 0.0], turn)
+    state = at(end.position + [0.0, off, 0.0], turn)
     monitor.see(state, drawn.last)
     assert monitor.near is near
     if near:

@@ -31,6 +31,7 @@ def drawn(stiffness, cycles, seed=0, height=-1.5, **policy):
     return rig[0], rig[0].land().draw(12.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycles", [0, 1, 2, 4])
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
 def test_the_force_is_held_and_the_contact_measured_at_any_stiffness_and_delay(stiffness, cycles):
@@ -202,6 +203,7 @@ def test_a_surface_that_is_found_again_is_met_below_one_and_a_half_times_the_set
     assert abs(pairs[-50:, 0].mean() - 5.0) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycles", [2, 4])
 @pytest.mark.parametrize("stiffness", [5.0, 15.0])
 @pytest.mark.parametrize("deep", [1.0, 3.0])

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +19,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.instruments.protocols import SensorInfo
 from dmpcli.planning.plan import joined, sample, straight
+from dmpcli.spatial.pose import Pose
 from tests.control.fake_sensors import PolledSensor
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, FakeClock, FakeServo, stroke
 
@@ -41,7 +43,7 @@ def drawn(force, over, coupled=True, duration=3.0, **policy):
     """Draw a stroke and lift the tool off it by 20 mm; returns plan, loop and what was sent."""
     source = dataclasses.replace(stroke(duration, normal=UP), force=force)
     at = sample(source, PERIOD, 1.0, PEN_DOWN)
-    up = (at.position[-1] + [0.0, 0.0, 20.0], at.rotation[-1])
+    up = Pose(at.position[-1] + [0.0, 0.0, 20.0], at.rotation[-1])
     made = joined(
         at, [], [straight("retract", at.pose(-1), up, PERIOD, WIDE, 50.0, 15.0)], PERIOD, True
     )
@@ -63,6 +65,7 @@ def drawn(force, over, coupled=True, duration=3.0, **policy):
     return made, loop, np.array([position for position, _ in servo.sent])
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(st.floats(0.5, 20.0), st.floats(0.03, 0.2), st.sampled_from([2.5, 4.0]))
 def test_where_e_is_0_the_coupled_stream_is_the_plain_one(k, delay, duration):
@@ -78,6 +81,7 @@ def test_where_e_is_0_the_coupled_stream_is_the_plain_one(k, delay, duration):
     assert set(loop.log.columns()["contact"]) <= {"free", "retreating", None}
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.floats(1.2, 10.0), st.floats(0.05, 0.15), st.floats(-4.0, 4.0))
 def test_after_contact_has_ended_the_offset_decays_and_the_goal_is_reached(k, delay, over):

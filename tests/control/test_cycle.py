@@ -12,7 +12,8 @@ from dmpcli.control.signals import Interruption
 from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import PlannedStroke, make
+from dmpcli.planning.plan import make
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.drag_fakes import FakeServo, drag_settings
 from tests.control.fake_sensors import StreamingSensor
 from tests.control.test_drag_loop import WEIGHTLESS
@@ -59,7 +60,7 @@ def executed(stall, asleep):
     t = np.arange(0.0, 3.01, PERIOD)
     u = t / t[-1]
     x = 50.0 * minimum_jerk(u)
-    still = PlannedStroke("0", t, np.column_stack([x, 0 * x, 0 * x]), None)
+    still = StrokeTrajectory(t, np.column_stack([x, 0 * x, 0 * x]), None, id="0")
     limits = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
     plan = make(still, PERIOD, 1.0, limits, (servo.position, servo.rotation), 20.0)
     arm = ReadyArm(servo, servo.open(), clock)

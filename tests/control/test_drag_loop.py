@@ -564,6 +564,7 @@ def test_more_force_or_torque_than_the_tool_may_meet_stops(wrench, words):
     assert servo.sent[-1][0] <= 1.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workspace", [None, (-50.0, 50.0, -900.0, 900.0, -900.0, 900.0), WIDEST])
 def test_an_arm_that_runs_away_is_held_in_a_room_about_its_start(workspace):
     """Whatever pulls it, for as long as it likes: a bias that nobody has noticed, for one."""

@@ -9,21 +9,21 @@ import pytest
 from dmpcli.control import execution_plan
 from dmpcli.control.cycle import ReadyArm
 from dmpcli.control.execution_plan import CheckedPlan
-from dmpcli.control.stroke_file import FoundStroke, StrokeSelection
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics import models
 from dmpcli.kinematics.reachability import Reach
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
+from dmpcli.records.stroke_selection import StrokeSelection
 from dmpcli.settings.execute import ExecuteSettings
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import START, FakeClock, FakeServo, plan, stroke
 
 
 def batch(*names, folder=True):
     t, position = np.arange(3.0), np.zeros((3, 3))
     found = [
-        FoundStroke(PlannedStroke(name, t, position), {"tau": 2.0, "start": [0, 0, 0]})
+        StrokeTrajectory(t, position, id=name, facts={"tau": 2.0, "start": [0, 0, 0]})
         for name in names
     ]
     return StrokeSelection(tuple(found), {}, (), folder)
@@ -76,7 +76,7 @@ def prepared(strokes, position=START, **options):
     servo = FakeServo(clock, position=position)
     done = []
     found = execution_plan.prepare(
-        StrokeSelection(tuple(FoundStroke(s, {}) for s in strokes), {}, (), len(strokes) > 1),
+        StrokeSelection(tuple(strokes), {}, (), len(strokes) > 1),
         ExecuteSettings(**options),
         ReadyArm(servo, servo.info, clock),
         False,
@@ -130,7 +130,7 @@ def test_a_stroke_that_is_asked_to_wait_forever_names_the_option():
 
 
 def test_what_the_first_stroke_says_of_all_is_told_once():
-    one, two = batch("a", "b").found
+    one, two = batch("a", "b").strokes
     two = dataclasses.replace(two, facts={"tau": 9.0, "goal": [1, 2, 3], "normal": None})
     facts = execution_plan.facts_of(StrokeSelection((one, two), {"x": "too long"}, (), True))
     assert facts == {
@@ -189,7 +189,7 @@ def test_an_arm_that_is_not_ready_is_refused_before_anything_is_planned():
     clock = FakeClock()
     servo = FakeServo(clock)
     servo.mode = "fault"
-    selected = StrokeSelection((FoundStroke(stroke(), {}),), {}, (), True)
+    selected = StrokeSelection((stroke(),), {}, (), True)
     with pytest.raises(RefusedError, match="robot: fault"):
         execution_plan.prepare(
             selected, ExecuteSettings(), ReadyArm(servo, servo.info, clock), False, lambda _: None
@@ -200,7 +200,7 @@ def test_the_joints_of_a_stroke_go_on_from_those_of_the_one_before():
     reach = Reach(models.model("ec66"))
     clock = FakeClock()
     servo = FakeServo(clock)
-    many = tuple(FoundStroke(stroke(4.0), {}) for _ in range(2))
+    many = (stroke(4.0),) * 2
     judged = execution_plan.prepare(
         StrokeSelection(many, {}, (), False), ExecuteSettings(), ReadyArm(servo, servo.info, clock),
         False, lambda _: None, reach,

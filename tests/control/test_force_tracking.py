@@ -17,6 +17,7 @@ from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.instruments.protocols import RobotState, Sample, SensorInfo
 from dmpcli.planning.plan import joined, straight
 from dmpcli.planning.plan import sample as sample_stroke
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler
 from tests.control.fake_sensors import BatchSensor
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, stroke
@@ -187,7 +188,7 @@ def test_the_plans_own_force_is_followed_and_an_override_leaves_lifted_parts_lif
 
 
 def test_on_the_way_down_it_is_lifted_off_the_plan_and_what_it_meets_there_stops_it():
-    start = (START + [0.0, 0.0, 20.0], PEN_DOWN)
+    start = Pose(START + [0.0, 0.0, 20.0], PEN_DOWN)
     made = plan(stroke(normal=UP), start=start, approach=20.0)
     supervisor = ContactSupervisor(ContactPolicy(5.0), PERIOD)
     press = ForceTracker(supervisor, fast_filter(5.0, PERIOD), made)
@@ -220,7 +221,7 @@ def test_at_the_last_set_point_the_last_force_is_wanted_and_beyond_it_too():
 
 
 def test_before_and_after_the_stroke_no_force_is_wanted():
-    made = plan(stroke(normal=UP), start=(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
+    made = plan(stroke(normal=UP), start=Pose(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
     press = ForceTracker(
         ContactSupervisor(ContactPolicy(3.0), PERIOD), fast_filter(5.0, PERIOD), made
     )
@@ -320,7 +321,7 @@ def test_only_what_is_drawn_and_wanted_is_counted():
 
 @pytest.mark.parametrize(("force", "fails"), [(4.99, False), (5.01, True)])
 def test_on_the_way_down_more_than_the_set_point_and_a_zero_is_met_too_early(force, fails):
-    made = plan(stroke(normal=UP), start=(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
+    made = plan(stroke(normal=UP), start=Pose(START + [0.0, 0.0, 20.0], PEN_DOWN), approach=20.0)
     supervisor = ContactSupervisor(ContactPolicy(3.0, zero_limit=2.0), PERIOD)
     press = ForceTracker(supervisor, fast_filter(5.0, PERIOD), made)
     press.come(5.0, push(UP, force), 1.5)
@@ -331,7 +332,7 @@ def test_on_the_way_down_more_than_the_set_point_and_a_zero_is_met_too_early(for
 
 def test_off_the_work_what_is_left_of_it_goes_with_the_way():
     source = sample_stroke(stroke(normal=UP), PERIOD, 1.0, PEN_DOWN)
-    end = (source.position[-1] + [0.0, 0.0, 20.0], source.rotation[-1])
+    end = Pose(source.position[-1] + [0.0, 0.0, 20.0], source.rotation[-1])
     off = straight("retract", source.pose(-1), end, PERIOD, WIDE, 50.0)
     made = joined(source, [], [off], PERIOD, True)
     press = ForceTracker(

@@ -19,6 +19,7 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
 from dmpcli.planning.plan import joined, sample, straight
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import (
     PEN_DOWN,
     START,
@@ -234,7 +235,7 @@ def test_a_course_out_of_reach_is_refused():
 def test_ways_and_outputs_behind_the_stroke_move_with_its_end():
     source = sample(stroke(duration=4.0), PERIOD, 1.0, PEN_DOWN)
     up = source.position[-1] + [0.0, 0.0, 20.0]
-    off = straight("retract", source.pose(-1), (up, source.rotation[-1]), PERIOD, WIDE, 50.0)
+    off = straight("retract", source.pose(-1), Pose(up, source.rotation[-1]), PERIOD, WIDE, 50.0)
     events = (OutputEvent(1.0, "DO1", on=True), OutputEvent(4.0, "DO1", on=False))
     base = joined(dataclasses.replace(source, events=events), [], [off], PERIOD, True)
     made = goal_course.moved(base, goal_course.first(base), FILTER, np.array([6.0, 0.0, 0.0]), 150)
@@ -261,17 +262,19 @@ def test_the_log_says_which_goal_is_followed():
 
 def test_only_a_plane_has_a_goal_that_moves():
     flat = stroke(normal=(0.0, 0.0, 1.0))
-    np.testing.assert_array_equal(plane_of(flat, {}), UP)
-    np.testing.assert_array_equal(plane_of(stroke(), {"normal": [0.0, 0.0, 2.0]}), UP)
+    np.testing.assert_array_equal(plane_of(flat), UP)
+    np.testing.assert_array_equal(
+        plane_of(dataclasses.replace(stroke(), facts={"normal": [0.0, 0.0, 2.0]})), UP
+    )
     bent = stroke(normal=(0.0, 0.0, 1.0))
     lean = np.linspace(0.0, 0.1, len(bent.t))
     normals = np.column_stack([np.sin(lean), 0.0 * lean, np.cos(lean)])
     with pytest.raises(RefusedError, match="curved surface"):
-        plane_of(dataclasses.replace(bent, normal=normals), {})
+        plane_of(dataclasses.replace(bent, normal=normals))
     with pytest.raises(InputError, match="which plane"):
-        plane_of(stroke(), {})
+        plane_of(stroke())
     with pytest.raises(InputError, match="original model"):
-        plane_of(flat, {"model": "original"})
+        plane_of(dataclasses.replace(flat, facts={"model": "original"}))
 
 
 @pytest.mark.parametrize(
@@ -322,7 +325,7 @@ def followed(*news, made=SHORT, told=None, **options):
 
 
 def test_a_source_is_asked_with_the_time_since_the_strokes_first_set_point():
-    made = plan(stroke(duration=4.0), start=(START + [0.0, 9.0, 0.0], PEN_DOWN))
+    made = plan(stroke(duration=4.0), start=Pose(START + [0.0, 9.0, 0.0], PEN_DOWN))
     assert made.lead > 10
     goals, source, _ = followed(made=made)
     for now, index in ((0.0, 0.0), (1.0, made.lead), (7.5, made.lead + 12.5)):
@@ -396,7 +399,7 @@ def test_the_last_set_point_but_one_is_the_last_that_a_goal_may_drive_the_stroke
         assert [one.kind for one in goals.told] == kinds
         assert len(goals.taken) == 1 - len(kinds)
     # On the way to the stroke it drives from the stroke's first set-point on.
-    made = plan(stroke(duration=4.0), start=(START + [0.0, 9.0, 0.0], PEN_DOWN))
+    made = plan(stroke(duration=4.0), start=Pose(START + [0.0, 9.0, 0.0], PEN_DOWN))
     goals, _, _ = followed(GoalNews(made.position[-1] + [1.0, 0.0, 0.0]), made=made)
     assert goals.step(0.0, 3.0) is not None
     assert goals.course.start == made.lead
@@ -443,11 +446,12 @@ def test_normals_that_differ_by_a_rounding_are_one_plane():
         normal[7] = [lean, 0.0, 1.0]
         bent = dataclasses.replace(flat, normal=normal)
         if fits:
-            np.testing.assert_array_equal(plane_of(bent, {}), UP)
+            np.testing.assert_array_equal(plane_of(bent), UP)
         else:
             with pytest.raises(RefusedError):
-                plane_of(bent, {})
-    np.testing.assert_allclose(plane_of(stroke(), {"normal": [0.0, 3.0, 4.0]}), [0.0, 0.6, 0.8])
+                plane_of(bent)
+    said = dataclasses.replace(stroke(), facts={"normal": [0.0, 3.0, 4.0]})
+    np.testing.assert_allclose(plane_of(said), [0.0, 0.6, 0.8])
 
 
 def test_what_drives_a_stroke_is_what_its_file_states():

@@ -7,6 +7,7 @@ from dmpcli.control import guards
 from dmpcli.control.guards import FollowingErrorMonitor
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import RobotState, ServoInfo
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp
 
 BOX = (-1.0, 1.0, -2.0, 2.0, -3.0, 3.0)
@@ -78,7 +79,7 @@ def test_the_trail_reaches_back_over_the_look_ahead_and_no_further():
     trail = FollowingErrorMonitor(INFO, 0.02, 5.0, 0.1)
     trail.check(state())
     for i in range(17):
-        trail.add(PLACE + [10.0 * i, 0.0, 0.0], LEVEL)
+        trail.add(Pose(PLACE + [10.0 * i, 0.0, 0.0], LEVEL))
     # 0.2 s of look-ahead and 0.1 s more: the last sixteen.
     trail.check(state(PLACE + [10.0, 4.9, 0.0]))
     with pytest.raises(RefusedError, match=r"following error 10\.00 mm"):
@@ -140,9 +141,9 @@ def test_the_following_error_is_that_of_the_nearest_set_point_up_to_its_limits()
     trail = FollowingErrorMonitor(INFO, 0.02, 5.0, 0.1)
     assert trail.strayed(state(PLACE + 99.0)) == (0.0, 0.0)
     assert trail.last is None
-    trail.add(PLACE, LEVEL)
-    trail.add(PLACE + [8.0, 0.0, 0.0], exp(np.array([0.0, 0.0, 0.3])))
-    assert trail.last[0][0] == PLACE[0] + 8.0
+    trail.add(Pose(PLACE, LEVEL))
+    trail.add(Pose(PLACE + [8.0, 0.0, 0.0], exp(np.array([0.0, 0.0, 0.3]))))
+    assert trail.last.position[0] == PLACE[0] + 8.0
     trail.check(state(PLACE + [0.0, 3.0, 4.0]))
     with pytest.raises(RefusedError, match=r"following error 5\.0"):
         trail.check(state(PLACE + [0.0, 3.0, 4.0078125]))
@@ -160,7 +161,7 @@ def test_the_following_error_is_that_of_the_nearest_set_point_up_to_its_limits()
 def test_it_remembers_the_look_ahead_and_a_tenth_of_a_second(lookahead, kept):
     trail = FollowingErrorMonitor(ServoInfo("fake", (0.002, 0.1), lookahead), 0.02, 5.0, 0.1)
     for i in range(50):
-        trail.add(np.array([10.0 * i, 0.0, 0.0]), LEVEL)
+        trail.add(Pose(np.array([10.0 * i, 0.0, 0.0]), LEVEL))
     oldest = 10.0 * (50 - kept)
     assert trail.strayed(state(np.array([oldest, 0.0, 0.0])))[0] == 0.0
     assert trail.strayed(state(np.array([oldest - 10.0, 0.0, 0.0])))[0] == 10.0

@@ -30,6 +30,7 @@ from dmpcli.planning.limits import Limits
 from dmpcli.planning.preflight import Check
 from dmpcli.planning.transfers import TransferOptions
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp
 from tests.control.contact_plant import Plant, Rig
 from tests.control.drag_fakes import rehearse
@@ -199,7 +200,7 @@ def recordings_by_a_hand():
 @KEPT.case
 def numbers_that_run_along_a_plan():
     found: list = []
-    made = plan(stroke(1.6), start=(START + 5.0, PEN_DOWN))
+    made = plan(stroke(1.6), start=Pose(START + 5.0, PEN_DOWN))
     for limits in (WIDE, TIGHT):
         for at in (None, 0, 30, made.lead, 70, len(made) - 2):
             for wait in (False, True):
@@ -247,7 +248,7 @@ def arms_that_come_to_rest():
             off = START + [0.0, 2.0 * left + shake * (k % 2), 0.0]
             turn = exp(np.array([0.0, 0.05 * left, 0.0])) @ PEN_DOWN
             state = RobotState(0.01 * k, off, turn, "ready")
-            errors.add(START + [0.0, 2.0 * left**2, 0.0], PEN_DOWN)
+            errors.add(Pose(START + [0.0, 2.0 * left**2, 0.0], PEN_DOWN))
             told.append([rest.rests(state), settled.reached(state), *errors.strayed(state)])
         found.append(np.array(told, dtype=float))
     return found
@@ -511,13 +512,19 @@ def verdicts_before_a_motion():
     out = Check("distance outside the workspace in x", 0.5, 0.0, "mm", 1.0, 51, "")
     ways = TransferOptions(3.0, 100.0, 50.0, 20.0, settling=10)
     strokes = [short(f"{n}", 0.6 + 0.1 * (n % 3), by=(0.0, 2.0 * n, 0.0)) for n in range(23)]
-    plans = list(transfers.plans(strokes, 0.02, 1.0, WIDE, (START, PEN_DOWN), True, ways))
+    plans = list(transfers.plans(strokes, 0.02, 1.0, WIDE, Pose(START, PEN_DOWN), True, ways))
     of = [
         CheckedPlan(p, [replace(near, value=2000.0 * (n + 1)), *([over] if n == 5 else [])])
         for n, p in enumerate(plans)
     ]
     of[7] = CheckedPlan(plans[7], [near, out])
-    batches = (of[:1], of[5:6], of[:3], of, [CheckedPlan(plan(start=(START + 9.0, PEN_DOWN)), [])])
+    batches = (
+        of[:1],
+        of[5:6],
+        of[:3],
+        of,
+        [CheckedPlan(plan(start=Pose(START + 9.0, PEN_DOWN)), [])],
+    )
     return [[table(some).splitlines(), preflight_facts(some)] for some in batches]
 
 

@@ -15,8 +15,8 @@ from dmpcli.control.outputs import OutputSwitch
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.commands.running import ended, invoke
 from tests.control.streaming_fakes import WIDE, FakeClock, FakeServo, plan, stroke
 
@@ -44,7 +44,7 @@ class Switching(FakeServo):
 
 def with_events(*events, duration=4.0):
     made = stroke(duration=duration)
-    return PlannedStroke(made.id, made.t, made.position, made.rotation, events=tuple(events))
+    return StrokeTrajectory(made.t, made.position, made.rotation, events=tuple(events), id=made.id)
 
 
 def bench(events, jumps=None, at=None, lookahead=0.2, queues=False, fails=()):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dmpcli.control.plan_cursor import PlanCursor
-from dmpcli.planning.plan import PlannedStroke
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import START, WIDE, plan, stroke
 
 
@@ -28,7 +29,7 @@ def test_every_set_point_comes_once():
 
 
 def test_phases_follow_each_other():
-    made = plan(start=(START + 5.0, stroke().rotation[0]))
+    made = plan(start=Pose(START + 5.0, stroke().rotation[0]))
     cursor = PlanCursor(made, WIDE)
     _, phases = run(cursor)
     assert phases == ["approach"] * made.lead + ["stroke"] * 501
@@ -48,7 +49,7 @@ def test_braking_ends_on_the_path_at_rest_inside_the_limits(at, duration):
     assert phases[at + 1] == "stop"
     assert np.all(np.diff(indices) >= 0)
     assert indices[-1] <= len(made) - 1
-    path = np.array([made.at(i)[0] for i in indices] + [made.at(indices[-1])[0]] * 3)
+    path = np.array([made.at(i).position for i in indices] + [made.at(indices[-1]).position] * 3)
     acceleration = np.diff(path, 2, axis=0) / 0.02**2
     assert np.linalg.norm(acceleration, axis=1).max() <= WIDE.acceleration
     speeds = np.linalg.norm(np.diff(path, axis=0), axis=1) / 0.02
@@ -59,7 +60,7 @@ def test_braking_a_fast_stroke_uses_most_of_the_acceleration():
     """It shall stop smoothly, not lazily: at 250 mm/s within half a second."""
     t = np.arange(301) * 0.02
     ramp = np.minimum(t, 0.3) ** 2 / 0.6 + np.maximum(t - 0.3, 0.0)
-    made = plan(PlannedStroke("0", t, START + 240.0 * ramp[:, None] * np.array([1.0, 0, 0])))
+    made = plan(StrokeTrajectory(t, START + 240.0 * ramp[:, None] * np.array([1.0, 0, 0]), id="0"))
     cursor = PlanCursor(made, WIDE)
     indices, _ = run(cursor, brake_at=150)
     assert (len(indices) - 151) * 0.02 < 0.5
@@ -74,7 +75,7 @@ def test_braking_at_rest_is_done_at_once():
 
 
 def test_it_waits_at_the_strokes_start_until_released():
-    made = plan(start=(START + 5.0, stroke().rotation[0]))
+    made = plan(start=Pose(START + 5.0, stroke().rotation[0]))
     cursor = PlanCursor(made, WIDE, wait=True)
     run(cursor, cycles=made.lead + 30)
     assert cursor.waiting

@@ -12,6 +12,7 @@ from dmpcli.control.servo_loop import DONE
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import Sample, SensorInfo
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import WIDE, FakeClock, FakeServo, plan, rows_of, stroke
 from tests.control.test_arrival import line, made, tour
 
@@ -82,7 +83,7 @@ def test_the_whole_plan_is_handed_over_before_anything_moves():
 
 def test_several_plans_are_one():
     first = plan(stroke(duration=2.0))
-    end = (first.position[-1], first.rotation[-1])
+    end = Pose(first.position[-1], first.rotation[-1])
     second = dataclasses.replace(plan(stroke(duration=2.0), start=end, approach=100.0), id="1")
     clock = FakeClock(PERIOD)
     servo = Player(clock)

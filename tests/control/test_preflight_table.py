@@ -7,6 +7,7 @@ import numpy as np
 from dmpcli.control.execution_plan import CheckedPlan
 from dmpcli.control.preflight_table import MOST_ROWS, table
 from dmpcli.planning.preflight import Check
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import PEN_DOWN, START, plan, stroke
 
 PASSED = Check("speed", 30.0, 250.0, "mm/s", 5.0, 251, "")
@@ -43,7 +44,7 @@ def test_what_is_over_its_limit_is_refused():
 
 
 def test_the_way_to_a_stroke_is_told_beside_its_own_time():
-    led = plan(start=(START + [0.0, 40.0, 0.0], PEN_DOWN))
+    led = plan(start=Pose(START + [0.0, 40.0, 0.0], PEN_DOWN))
     head = table([CheckedPlan(led, [PASSED])]).splitlines()[0]
     assert f"{length():.3f} mm in 10.000 s, 501 set-points" in head
     assert head.endswith(f", after an approach of {led.lead * 0.02:.3f} s")

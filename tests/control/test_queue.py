@@ -11,6 +11,7 @@ from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import RobotState
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import WIDE, FakeClock, FakeServo, plan, stroke
 
 WATCH = StopLimits(5.0, 0.1, 50.0, 5.0)
@@ -117,7 +118,7 @@ def held(made, count):
 
 def test_several_plans_follow_each_other():
     first = held(plan(stroke(duration=2.0)), 5)
-    end = (first.position[-1], first.rotation[-1])
+    end = Pose(first.position[-1], first.rotation[-1])
     second = dataclasses.replace(plan(stroke(duration=2.0), start=end, approach=100.0), id="1")
     loop, outcome, servo = run({99: 0.045, 102: 0.045}, first, then=[second])
     assert outcome.reason == DONE

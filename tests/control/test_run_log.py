@@ -7,14 +7,15 @@ from dmpcli.control.run_log import Row, RunLog, recovered
 from dmpcli.records import record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance, Record
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler
 from tests.control.streaming_fakes import PEN_DOWN, START
 
 
 def row(i, wrench=None):
-    pose = (START + i, from_euler(np.array([np.pi, 0.0, np.pi - 0.02 + 0.01 * i])))
+    pose = Pose(START + i, from_euler(np.array([np.pi, 0.0, np.pi - 0.02 + 0.01 * i])))
     return Row(
-        0.02 * i, 0.02 * i, pose, pose, (START, PEN_DOWN), 0.02 * i, 0.0, wrench, -0.5, "ready",
+        0.02 * i, 0.02 * i, pose, pose, Pose(START, PEN_DOWN), 0.02 * i, 0.0, wrench, -0.5, "ready",
         "stroke",
     )  # fmt: skip
 

@@ -16,6 +16,7 @@ from dmpcli.control.signals import Interruption
 from dmpcli.control.stopping import StopOutcome
 from dmpcli.errors import InputError, InstrumentError, RefusedError
 from dmpcli.instruments.protocols import SensorInfo
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp
 from tests.control.fake_sensors import PolledSensor, StreamingSensor
 from tests.control.streaming_fakes import (
@@ -677,7 +678,7 @@ def test_why_a_set_point_was_not_taken_is_asked_of_the_arm():
 
 
 def test_a_row_says_what_was_planned_sent_and_felt_in_its_cycle():
-    made = plan(stroke(2.0, normal=(0, 0, 1)), start=(START + [0.0, 0.0, 2.0], PEN_DOWN))
+    made = plan(stroke(2.0, normal=(0, 0, 1)), start=Pose(START + [0.0, 0.0, 2.0], PEN_DOWN))
     bench = Bench(made, presses=True)
     bench.servo.position = made.position[0]
     bench.sensor.plate = START[2] - 0.5

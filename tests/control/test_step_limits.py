@@ -9,6 +9,7 @@ from dmpcli.control.step_limits import StepLimits, check_start
 from dmpcli.errors import InstrumentError, RefusedError
 from dmpcli.instruments.protocols import RobotState
 from dmpcli.planning.limits import Limits
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan
 
@@ -24,8 +25,9 @@ def walked(steps, turns=None, limits=LIMITS):
     for step, turn in zip([0.0, *steps], [0.0, *(turns or [0.0] * len(steps))], strict=True):
         position = position + step * ALONG
         rotation = exp(turn * ALONG) @ rotation
-        checked.check(before, position, rotation)
-        before = position, rotation
+        setpoint = Pose(position, rotation)
+        checked.check(before, setpoint)
+        before = setpoint
 
 
 def rising(size, most, count):
@@ -65,9 +67,9 @@ def test_no_set_point_leaves_the_workspace_or_is_no_number():
     with pytest.raises(RefusedError):
         walked([0.5, 1.2, 1.5], limits=box)
     with pytest.raises(RefusedError):
-        StepLimits(box, PERIOD).check(None, START + [5.0, 0.0, 0.0], PEN_DOWN)
+        StepLimits(box, PERIOD).check(None, Pose(START + [5.0, 0.0, 0.0], PEN_DOWN))
     with pytest.raises(Exception, match="number"):
-        StepLimits(LIMITS, PERIOD).check(None, START * np.nan, PEN_DOWN)
+        StepLimits(LIMITS, PERIOD).check(None, Pose(START * np.nan, PEN_DOWN))
 
 
 def stands(off=0.0, turned=0.0, limits=WIDE, mode="ready"):

@@ -9,8 +9,8 @@ from dmpcli.control.cycle import ReadyArm, StopLimits
 from dmpcli.control.servo_loop import DONE, ServoLoop
 from dmpcli.control.signals import Interruption
 from dmpcli.planning import transfers
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import PEN_DOWN, WIDE, FakeClock, FakeServo
 from tests.minimum_jerk import minimum_jerk
 
@@ -23,7 +23,9 @@ def line(name, start, goal, turn=0.0):
     u = minimum_jerk(t / 2.0)[:, None]
     start, goal = np.array(start, float), np.array(goal, float)
     up = np.tile([0.0, 0.0, 1.0], (101, 1))
-    return PlannedStroke(name, t, start + u * (goal - start), np.tile(PEN_DOWN, (101, 1, 1)), up)
+    return StrokeTrajectory(
+        t, start + u * (goal - start), np.tile(PEN_DOWN, (101, 1, 1)), up, id=name
+    )
 
 
 STROKES = [
@@ -47,7 +49,8 @@ def run(at=None):
     deeds = {
         n: (lambda deed: lambda servo: deed(servo, interruption))(d) for n, d in (at or {}).items()
     }
-    servo = FakeServo(clock, *STROKES[0].pose(0), at=deeds)
+    begin = STROKES[0].pose(0)
+    servo = FakeServo(clock, begin.position, begin.rotation, at=deeds)
     arm = ReadyArm(servo, servo.info, clock)
     loop = ServoLoop(PLANS[0], WIDE, StopLimits(5.0, 0.1, 50.0, 5.0), arm, then=PLANS[1:])
     return loop, loop.run(interruption), servo
@@ -75,6 +78,7 @@ def test_rows_tell_phase_and_stroke():
     assert all(name is None for name in columns["id"][~drawing])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "phase", "drawn"),
     [

@@ -20,6 +20,7 @@ from dmpcli import live_view
 from dmpcli.control import watching
 from dmpcli.control.run_log import Row, RunLog
 from dmpcli.live_view import SIZE, RowView, SharedRow
+from dmpcli.spatial.pose import Pose
 from tests.commands.test_execute import columns, written
 from tests.control.streaming_fakes import plan, stroke
 from tests.control.test_servo_loop import Bench
@@ -39,7 +40,7 @@ def drawn(content):
 
 def add(log, numbers, late=0.0004):
     for k in numbers:
-        pose = (np.array([1.0 * k, 2.0, 3.0]), np.eye(3))
+        pose = Pose(np.array([1.0 * k, 2.0, 3.0]), np.eye(3))
         wrench = np.array([1.0, 2.0, 2.0, 0.1, 0.0, 0.0])
         log.add(
             0.02 * k,

@@ -51,6 +51,7 @@ def test_corrected_weights_end_as_required(count, alpha_1):
     np.testing.assert_allclose(none @ moves.T, 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 12, 80])
 def test_the_correction_moves_the_path_hardly_farther_than_any_weights_could(count):
     """Any weights: all of them, by scipy's minimizer of least squares under linear conditions."""

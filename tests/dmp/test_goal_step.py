@@ -40,6 +40,7 @@ def test_a_critically_damped_step_has_its_closed_form():
     np.testing.assert_allclose(made[:, 0], np.outer(rise, [10.0, 0.0, -3.0]), atol=1e-12)
 
 
+@pytest.mark.slow
 @given(gains, st.lists(ways, min_size=1, max_size=5), st.data())
 def test_whatever_the_goal_does_position_and_velocity_are_continuous(given_gains, goals, data):
     filter_ = GoalFilter(*given_gains)
@@ -52,6 +53,7 @@ def test_whatever_the_goal_does_position_and_velocity_are_continuous(given_gains
         state = response(filter_, state, shift, data.draw(st.integers(1, 40)))[-1]
 
 
+@pytest.mark.slow
 @given(gains, st.lists(ways, min_size=1, max_size=4), st.integers(1, 50))
 def test_the_last_goal_is_reached_and_when_is_known(given_gains, goals, held):
     filter_, state = GoalFilter(*given_gains), still()

@@ -58,6 +58,7 @@ def test_tilt_alone_leans_to_plus_v_wherever_the_stroke_turns():
     np.testing.assert_allclose(axis, np.broadcast_to([0, np.sin(0.3), np.cos(0.3)], axis.shape))
 
 
+@pytest.mark.slow
 @given(st.tuples(*[st.floats(-0.6, 0.6)] * 3), ANGLES, ANGLES)
 def test_the_smallest_rotation_leads_to_the_axis(lean, lead, tilt):
     position = np.linspace(0.0, 50.0, 40)[None, :, None] * np.array([1.0, 0.0, 0.0])

@@ -248,6 +248,7 @@ def test_the_spread_of_several_demonstrations_is_their_standard_deviation_by_axi
     assert fit(given[:1], FitOptions()).skill.spread is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["modified", "original"])
 def test_the_same_stroke_drawn_slower_teaches_the_same_to_the_paper(model):
     """Two demonstrations of one shape, 5 s and 10 s: the skill of either, drawn in 7.5 s."""

@@ -14,14 +14,13 @@ import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 import pytest
 
 from dmpcli.commands.examples import ROBOT, SENSOR
 from tests.commands.running import ended, invoke
-from tests.commands.test_examples import cell, lay_out
+from tests.commands.test_examples import lay_out, real_cell
 from tests.commands.virtual_lab import FREE_PORTS, Lab
 from tests.docs.pages import ELSEWHERE, PAGES, ROOT, blocks, lines, name_of
 from tests.docs.test_pages import texts
@@ -165,10 +164,7 @@ def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):
             for name, value in store.environment.items():
                 monkeypatch.setenv(name, value)
         if any(robot in line for line in typed):
-            stack.enter_context(cell().laid_out())
-            for module in ("control.watchdog", "workflows.record"):
-                target = f"dmpcli.{module}.watched"
-                stack.enter_context(mock.patch(target, lambda servo: servo))
+            stack.enter_context(real_cell())
         for line in typed:
             run(line, variables)
 
@@ -203,6 +199,7 @@ def test_python_that_runs_elsewhere_is_taken_from_the_page_there():
         assert "exec(" in text or "write_text(" in text, file
 
 
+@pytest.mark.slow
 def test_every_fence_is_run_or_shows_what_the_program_says():
     """Commands stand in fences of sh, and are run; in those of text, what the program says."""
     whole = "\n".join(texts())
@@ -244,6 +241,7 @@ def test_commands_of_pages_that_take_long_are_understood():
             assert re.search(rf"\b{name}\b", rules) if value else name in phony, line
 
 
+@pytest.mark.slow
 def test_modules_that_pages_run_are_there_and_take_their_words():
     for page in STANDING:
         text = page.read_text()

@@ -53,6 +53,7 @@ def test_a_seed_replays_its_run():
     assert (once.faults, once.code, once.told) == (again.faults, again.code, again.told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_defect_is_found(name, monkeypatch):
     # One of them never ends; what is well ends within 4 s.

@@ -75,6 +75,7 @@ def test_the_table_has_every_format():
     assert list(NEAR) == list(FORMATS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", NEAR)
 def test_what_left_comes_back(trajectory, tmp_path, word):
     near = NEAR[word]

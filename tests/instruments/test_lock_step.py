@@ -76,6 +76,7 @@ def run(*arguments, expect=0):
     return result.stderr
 
 
+@pytest.mark.slow
 def test_a_contact_bench_needs_no_real_time_and_gives_the_same_bytes_again(
     spring, tool, stroke, tmp_path, monkeypatch
 ):

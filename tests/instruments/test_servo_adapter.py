@@ -14,6 +14,7 @@ from dmpcli.instruments.joint_space import JointSpace
 from dmpcli.instruments.protocols import ServoInfo
 from dmpcli.kinematics import chain, inverse, models
 from dmpcli.simulation.mock import PEN
+from dmpcli.spatial.pose import Pose
 from tests.instruments.instrument_conformance import check_servo
 
 ARM = models.model("ec66")
@@ -81,13 +82,13 @@ class Brand:
         if self.tool is not None:
             position = position + rotation @ self.tool.tcp_position
             rotation = rotation @ self.tool.tcp_rotation
-        return position, rotation
+        return Pose(position, rotation)
 
     def connect(self):
         return self.said
 
     def state(self):
-        pose = pose_forms.encode(self.said, *self.pose_now) if self.pose is None else self.pose
+        pose = pose_forms.encode(self.said, self.pose_now) if self.pose is None else self.pose
         joints = np.degrees(self.joints) if self.said.angle == "deg" else self.joints
         return DriverState(self.clock.now(), self.mode, joints, pose, self.detail)
 
@@ -114,7 +115,7 @@ class Pusher(Brand):
 
     def __init__(self, said):
         super().__init__(said)
-        self.at = pose_forms.encode(said, *self.pose_now)
+        self.at = pose_forms.encode(said, self.pose_now)
 
     def state(self):
         return DriverState(self.clock.now(), self.mode, None, self.at)
@@ -149,15 +150,15 @@ def test_poses_are_written_as_scipy_writes_them_and_read_back(orientation, angle
     said = declared(orientation=orientation, angle=angle, length=length)
     position = rng.uniform(-900.0, 900.0, 3)
     rotation = Rotation.random(rng=rng).as_matrix()
-    written = pose_forms.encode(said, position, rotation)
+    written = pose_forms.encode(said, Pose(position, rotation))
     np.testing.assert_allclose(written[:3] * (1000.0 if length == "m" else 1.0), position)
     ours, theirs = written[3:], by_scipy(said, rotation)
     if orientation == "quaternion":
         theirs = theirs * np.sign(theirs @ ours)
     np.testing.assert_allclose(ours, theirs, atol=1e-6)
-    back, turned = pose_forms.decode(said, written)
-    np.testing.assert_allclose(back, position, atol=1e-9)
-    np.testing.assert_allclose(turned, rotation, atol=1e-9)
+    back = pose_forms.decode(said, written)
+    np.testing.assert_allclose(back.position, position, atol=1e-9)
+    np.testing.assert_allclose(back.rotation, rotation, atol=1e-9)
 
 
 @pytest.mark.parametrize(("orientation", "angle", "length"), FORMS)
@@ -191,9 +192,9 @@ def test_joint_set_points_bring_the_tools_tip_to_the_pose():
     np.testing.assert_allclose(state.joints, HOME)
     goal = state.position + [1.0, -2.0, 0.5]
     assert servo.send(goal, state.rotation)
-    at, turned = driver.pose_now
-    np.testing.assert_allclose(at, goal, atol=1e-6)
-    np.testing.assert_allclose(turned, state.rotation, atol=1e-9)
+    there = driver.pose_now
+    np.testing.assert_allclose(there.position, goal, atol=1e-6)
+    np.testing.assert_allclose(there.rotation, state.rotation, atol=1e-9)
     np.testing.assert_allclose(driver.sent[-1], np.degrees(driver.joints))
 
 
@@ -239,7 +240,7 @@ def test_a_controller_that_knows_another_tool_is_refused(reports, held, words):
 def test_a_controller_with_other_euler_angles_is_refused_by_their_name():
     tilted = HOME + np.radians([0.0, 0.0, 0.0, 10.0, 15.0, 0.0])
     driver = Brand(joints=tilted)
-    driver.pose = pose_forms.encode(declared(orientation="zyx euler"), *driver.pose_now)
+    driver.pose = pose_forms.encode(declared(orientation="zyx euler"), driver.pose_now)
     with pytest.raises(RefusedError, match="its orientation would fit as zyx euler"):
         opened(driver)
     driver.said = declared(orientation="zyx euler")
@@ -248,9 +249,9 @@ def test_a_controller_with_other_euler_angles_is_refused_by_their_name():
 
 def test_a_controller_with_turned_frames_is_refused_with_the_turns_that_fit():
     driver = Brand()
-    position, rotation = driver.pose_now
+    position, rotation = driver.pose_now.position, driver.pose_now.rotation
     half, quarter = (Rotation.from_euler("z", a).as_matrix() for a in (np.pi, np.pi / 2))
-    driver.pose = pose_forms.encode(driver.said, half @ position, half @ rotation @ quarter)
+    driver.pose = pose_forms.encode(driver.said, Pose(half @ position, half @ rotation @ quarter))
     with pytest.raises(RefusedError, match="base_turn=180&flange_turn=90"):
         opened(driver)
     driver.said = declared(base_turn=np.pi, flange_turn=np.pi / 2)
@@ -269,7 +270,7 @@ class Solver(Brand):
     def inverse(self, pose, near):
         self.questions.append(pose)
         goal = pose_forms.decode(self.meant, pose)
-        joints = inverse.nearest(ARM, *goal, np.radians(near))
+        joints = inverse.nearest(ARM, goal.position, goal.rotation, np.radians(near))
         return None if self.error is None else np.degrees(joints + self.error)
 
 
@@ -299,7 +300,7 @@ def test_an_inverse_kinematics_that_is_no_number_is_the_drivers_fault(error):
 def test_euler_angles_that_a_pen_pointing_down_cannot_tell_apart_show_in_the_inverse_kinematics():
     other = declared(orientation="zyx euler")
     driver = Solver(np.zeros(6), other)
-    driver.pose = pose_forms.encode(other, *driver.pose_now)
+    driver.pose = pose_forms.encode(other, driver.pose_now)
     alone = Brand()
     alone.pose = driver.pose
     opened(alone)
@@ -381,8 +382,9 @@ def test_only_a_driver_that_plays_plans_makes_a_servo_that_does():
 @pytest.mark.parametrize("remedy", ["see tool=N", "; see tool=N", ""])
 def test_what_the_driver_advises_is_set_off_from_what_is_wrong(remedy):
     space = JointSpace(ARM, declared(angle="rad", remedy=remedy), None)
-    there, rotation = space.tcp(HOME)
-    said = np.concatenate([there + [9.0, 0.0, 0.0], by_scipy(declared(angle="rad"), rotation)])
+    tcp = space.tcp(HOME)
+    turn = by_scipy(declared(angle="rad"), tcp.rotation)
+    said = np.concatenate([tcp.position + [9.0, 0.0, 0.0], turn])
     with pytest.raises(RefusedError) as refused:
         space.check(HOME, said)
     ending = str(refused.value).split("Euler angles differ")[1]

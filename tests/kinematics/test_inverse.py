@@ -101,6 +101,7 @@ def test_too_near_to_the_first_axis_is_out_of_reach():
         inverse.nearest(EC66, at, DOWN, np.zeros(6))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @example(np.array([2e-05, 0.998046875, 2e-05, 0.125, 2e-05, 0.0]))
 @given(ANGLES)

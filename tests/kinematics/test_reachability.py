@@ -6,6 +6,7 @@ from dmpcli.dmp.time_scaling import Timing
 from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, models
 from dmpcli.kinematics.reachability import Reach, attitude
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp, from_euler, to_euler
 from dmpcli.spatial.wrench import Tool
 from dmpcli.surfaces.surface import Status
@@ -84,12 +85,13 @@ def test_the_joints_that_a_robot_tells_are_believed_only_where_its_tcp_is(base_t
     position = base @ p + attitude_of_flange @ PEN.tcp_position
     rotation = attitude_of_flange @ PEN.tcp_rotation
     reach = Reach(EC66, PEN, base_turn, flange_turn)
-    assert reach.standing(Q, position, rotation) is Q
-    assert reach.standing(None, position, rotation) is None
+    tcp = Pose(position, rotation)
+    assert reach.standing(Q, tcp) is Q
+    assert reach.standing(None, tcp) is None
     with pytest.raises(RefusedError, match=r"10\.0 mm and 0\.0° from where an ec66"):
-        reach.standing(Q, position + [0, 0, 10], rotation)
+        reach.standing(Q, Pose(position + [0, 0, 10], rotation))
     with pytest.raises(RefusedError, match="check --robot-model and --tool"):
-        reach.standing(np.zeros(7), position, rotation)
+        reach.standing(np.zeros(7), tcp)
     found = reach.follow(position[None, None], rotation[None, None], 0.02, Q)
     assert found.joints[0, 0] == pytest.approx(Q, abs=1e-9)
 

@@ -103,14 +103,14 @@ def test_where_only_the_file_finds_no_room_the_journal_is_whole(tmp_path, traj):
 )
 @pytest.mark.parametrize("command", ["record", "execute"])
 def test_the_reason_for_a_stop_is_the_last_line_and_a_fact_of_the_file(
-    dmpcli, tmp_path, traj, command, fault, code, words
+    in_process, tmp_path, traj, command, fault, code, words
 ):
     name, _, value = fault.partition("=")
     options = [name, *(value.split() if name == "--workspace" else [value])]
     if command == "execute":
         options = ["--sensor", "mock:?plate=-17", *options] if name == "--max-force" else options
     given = [command, *([traj] if command == "execute" else []), "-o", "out.parquet", *options]
-    last = dmpcli(*given, code=code).stderr.decode().strip().splitlines()[-1]
+    last = in_process(*given, code=code).stderr.strip().splitlines()[-1]
     assert words in last
     if command == "execute" and name == "--workspace":
         assert not (tmp_path / "out.parquet").exists(), "refused before anything moved"

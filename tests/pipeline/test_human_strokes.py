@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.human_strokes import shapes, strokes
@@ -13,6 +12,8 @@ PIPED = "heee"
 
 
 def check_fit_generalize_report(run, folder, shape):
+    import pandas as pd
+
     one = strokes(shape)[0]
     frame = pd.DataFrame(np.column_stack([one.t, one.position]), columns=list("txyz"))
     frame.to_csv(folder / "demo.csv", index=False, sep=" ")

@@ -16,9 +16,9 @@ RECORDED = ROOT / "sample_runs" / "recorded.parquet"
 PAIR = ["--start", "-701.698", "132.420", "-17.538", "--goal", "-807.597", "129.739", "-17.518"]
 
 
-def heights(dmpcli, *files):
+def heights(run, *files):
     """Mean wave height by stroke name."""
-    report = json.loads(dmpcli("report", *files, "--json").stdout)
+    report = json.loads(run("report", *files, "--json").stdout)
     strokes = [stroke for file in report["files"] for stroke in file["strokes"]]
     return {stroke["stroke"]: stroke["wave"]["mean"] for stroke in strokes}
 
@@ -34,7 +34,7 @@ def shell(command, folder):
 
 
 @pytest.mark.slow
-def test_record_to_report(dmpcli, tmp_path):
+def test_record_to_report(dmpcli, in_process, tmp_path):
     dmpcli("record", "-o", "demo.parquet", "--seed", "1")
     dmpcli("fit", "demo.parquet", "-o", "skill.json")
     ease = ["--ease-in", "0.5", "--ease-out", "0.5"]
@@ -44,8 +44,8 @@ def test_record_to_report(dmpcli, tmp_path):
     assert b"nearest RMS" in done.stdout
     assert (tmp_path / "out" / "report.html").is_file()
     words = ["demo.parquet", "traj.parquet", "run.parquet", "--paper", "--png", "-o", "out"]
-    done = dmpcli("report", *words)
-    assert b"Table 2" in done.stdout
+    done = in_process("report", *words)
+    assert "Table 2" in done.stdout
     for stem in ("fig7", "fig8"):
         for suffix in ("svg", "png"):
             assert list((tmp_path / "out").glob(f"{stem}*.{suffix}"))
@@ -78,14 +78,14 @@ def test_the_same_seed_gives_the_same_bytes_through_every_stage(dmpcli, in_proce
     assert len(files) >= 8
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
-    dmpcli("record", "-o", "other.parquet", "--seed", "8", "--duration", "4")
+    in_process("record", "-o", "other.parquet", "--seed", "8", "--duration", "4")
     assert (tmp_path / "other.parquet").read_bytes() != (tmp_path / "a/demo.parquet").read_bytes()
 
 
 @pytest.mark.slow
-def test_the_sample_runs_are_what_the_tool_makes(dmpcli, tmp_path):
+def test_the_sample_runs_are_what_the_tool_makes(in_process, tmp_path):
     config = ROOT / "sample_runs" / "recorded.toml"
-    dmpcli("record", "-o", "again.parquet", "--config", config, "--seed", "1")
+    in_process("record", "-o", "again.parquet", "--config", config, "--seed", "1")
     again = record.decode(file_io.read(tmp_path / "again.parquet"))
     kept = record.decode(file_io.read(RECORDED))
     assert again.provenance == kept.provenance
@@ -95,8 +95,8 @@ def test_the_sample_runs_are_what_the_tool_makes(dmpcli, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_recorded_samples_wave_height_is_the_papers(dmpcli):
-    found = heights(dmpcli, RECORDED)
+def test_the_recorded_samples_wave_height_is_the_papers(in_process):
+    found = heights(in_process, RECORDED)
     assert found["recorded"] == pytest.approx(49.979, abs=0.3)
 
 
@@ -132,8 +132,8 @@ def test_tables_1_and_2_reach_the_promised_bounds(in_process, fitted):
 
 
 @pytest.mark.slow
-def test_an_interrupted_writer_leaves_the_old_file(dmpcli, tmp_path):
-    dmpcli("fit", REFERENCE, "-o", "skill.json")
+def test_an_interrupted_writer_leaves_the_old_file(in_process, tmp_path):
+    in_process("fit", REFERENCE, "-o", "skill.json")
     before = (tmp_path / "skill.json").read_bytes()
     slow = f"(head -c 3000 {REFERENCE}; sleep 5) | timeout -s KILL 2 {DMPCLI} fit - -o skill.json"
     assert shell(slow, tmp_path).returncode != 0

@@ -13,6 +13,7 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
 from dmpcli.planning.plan import joined, sample, straight
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, stroke
 
 PERIOD = 0.02
@@ -28,8 +29,8 @@ def whole(duration=4.0):
     events = (OutputEvent(1.0, "DO1", on=True), OutputEvent(duration, "DO1", on=False))
     source = sample(dataclasses.replace(source, force=force, events=events), PERIOD, 1.0, PEN_DOWN)
     rise = np.array([0.0, 0.0, 20.0])
-    end = (source.position[-1] + rise, source.rotation[-1])
-    begin = (source.position[0] + rise, source.rotation[0])
+    end = Pose(source.position[-1] + rise, source.rotation[-1])
+    begin = Pose(source.position[0] + rise, source.rotation[0])
     onto = straight("approach", begin, source.pose(0), PERIOD, WIDE, 50.0)
     off = straight("retract", source.pose(-1), end, PERIOD, WIDE, 50.0)
     return joined(source, [onto], [off], PERIOD, True)

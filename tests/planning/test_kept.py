@@ -14,6 +14,7 @@ from dmpcli.planning.limits import Limits, limits_of
 from dmpcli.planning.spline import between, spline, window
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.spatial import rotations
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, stroke
 from tests.kept import Kept
 
@@ -40,9 +41,9 @@ def strokes():
 
 def poses():
     return [
-        (START, PEN_DOWN),
-        (START + [30.0, -40.0, 20.0], turned([0.1, 0.0, 0.4])),
-        (START, turned([0.0, 0.2, 0.0])),
+        Pose(START, PEN_DOWN),
+        Pose(START + [30.0, -40.0, 20.0], turned([0.1, 0.0, 0.4])),
+        Pose(START, turned([0.0, 0.2, 0.0])),
     ]
 
 
@@ -69,7 +70,7 @@ def plans_of_strokes():
 
 @KEPT.case
 def straight_ways():
-    found: list = [plan.gap(a, b) for a in poses() for b in poses()]
+    found: list = [a.apart(b) for a in poses() for b in poses()]
     for limits in (WIDE, TIGHT):
         for speed in (5.0, 60.0):
             for start in poses()[1:]:

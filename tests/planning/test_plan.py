@@ -6,9 +6,10 @@ import pytest
 from dmpcli.errors import InputError
 from dmpcli.planning import plan as planning
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import PlanSegment, gap, joined, sample, straight
+from dmpcli.planning.plan import PlanSegment, joined, sample, straight
 from dmpcli.spatial import rotations
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, sine, stroke
 from tests.minimum_jerk import minimum_jerk
 
@@ -52,7 +53,7 @@ def test_a_duration_that_is_no_multiple_of_the_period_still_ends_at_the_goal():
 def test_approach_is_straight_at_rest_at_both_ends_and_slow_enough():
     away = START + np.array([30.0, -40.0, 0.0])
     turned = rotations.exp(np.array([0.0, 0.0, 0.2])) @ PEN_DOWN
-    made = plan(stroke(), start=(away, turned), approach=25.0)
+    made = plan(stroke(), start=Pose(away, turned), approach=25.0)
     way = made.position[: made.lead + 1]
     np.testing.assert_allclose(way[0], away)
     assert np.array_equal(made.position[made.lead], START)
@@ -67,7 +68,7 @@ def test_approach_is_straight_at_rest_at_both_ends_and_slow_enough():
 
 
 def test_a_short_approach_at_high_speed_keeps_acceleration_and_jerk():
-    made = plan(stroke(), start=(START + 1.0, PEN_DOWN), approach=250.0)
+    made = plan(stroke(), start=Pose(START + 1.0, PEN_DOWN), approach=250.0)
     _, acceleration, jerk = made.derivatives()
     head = slice(0, made.lead + 1)
     assert np.linalg.norm(acceleration[head, 0], axis=1).max() < WIDE.acceleration
@@ -76,7 +77,7 @@ def test_a_short_approach_at_high_speed_keeps_acceleration_and_jerk():
 
 def test_a_missing_orientation_holds_the_arms():
     held = rotations.exp(np.array([0.1, 0.2, 0.3])) @ PEN_DOWN
-    made = plan(stroke(rotated=False), start=(START, held))
+    made = plan(stroke(rotated=False), start=Pose(START, held))
     np.testing.assert_allclose(made.rotation, np.broadcast_to(held, made.rotation.shape))
     assert not made.oriented
 
@@ -87,17 +88,17 @@ def test_what_lies_far_off_does_not_count_between_two_set_points():
     expected = made.at(200.5)
     for part in (made.position, made.rotation):
         part[:150], part[250:] = np.nan, np.nan
-    position, rotation = made.at(200.5)
-    np.testing.assert_array_equal(position, expected[0])
-    np.testing.assert_array_equal(rotation, expected[1])
+    found = made.at(200.5)
+    np.testing.assert_array_equal(found.position, expected.position)
+    np.testing.assert_array_equal(found.rotation, expected.rotation)
 
 
 def test_between_two_set_points_the_plan_runs_on_the_curve():
     made = plan(stroke(turn=0.8))
-    position, rotation = made.at(200.5)
-    np.testing.assert_allclose(position, sine(200.5 * 0.02, 10.0), atol=1e-5)
-    expected = np.array([np.pi, 0.0, 0.8 * minimum_jerk(200.5 / 500)])
-    assert gap((position, rotation), (position, rotations.from_euler(expected)))[1] < 1e-6
+    found = made.at(200.5)
+    np.testing.assert_allclose(found.position, sine(200.5 * 0.02, 10.0), atol=1e-5)
+    expected = rotations.from_euler(np.array([np.pi, 0.0, 0.8 * minimum_jerk(200.5 / 500)]))
+    assert found.apart(replace(found, rotation=expected))[1] < 1e-6
     assert made.time_at(200.5) == pytest.approx(4.01)
 
 
@@ -105,7 +106,7 @@ def test_derivatives_of_a_known_motion():
     """Constant speed from and to a standstill: one step in velocity at each end."""
     source = stroke()
     position = START + np.arange(501)[:, None] * np.array([0.2, 0.0, 0.0])
-    made = plan(type(source)("0", source.t, position, source.rotation))
+    made = plan(replace(source, position=position))
     velocity, acceleration, jerk = made.derivatives()
     np.testing.assert_allclose(velocity[:, 0, 0], 10.0)
     np.testing.assert_allclose(acceleration[[0, 1, -2, -1], 0, 0], [500, 0, 0, -500], atol=1e-6)
@@ -117,7 +118,7 @@ def test_derivatives_of_a_known_turn_are_about_base_axes():
     # Tilted, since a pen that points straight down is its own inverse.
     tilted = rotations.exp(np.array([0.3, 0.2, 0.0]))
     source = stroke(turn=0.8)
-    source = type(source)("0", source.t, source.position, source.rotation @ tilted)
+    source = replace(source, rotation=source.rotation @ tilted)
     velocity, acceleration, jerk = plan(source).derivatives()
     at = np.argmax(velocity[:, 1, 2] ** 2)
     assert abs(velocity[at, 1, 2]) == pytest.approx(1.875 * 0.08, rel=1e-3)
@@ -154,8 +155,8 @@ FREE = Limits(1e9, 1e12, 1e15, 1e9, 1e12, 1e15)
     ],
 )
 def test_a_straight_way_takes_as_long_as_its_nearest_limit_asks(name, most, duration):
-    goal = (START + [24.0, -32.0, 0.0], rotations.exp(np.array([0.0, 0.3, 0.4])) @ PEN_DOWN)
-    made = way((START, PEN_DOWN), goal, replace(FREE, **{name: most}))
+    goal = Pose(START + [24.0, -32.0, 0.0], rotations.exp(np.array([0.0, 0.3, 0.4])) @ PEN_DOWN)
+    made = way(Pose(START, PEN_DOWN), goal, replace(FREE, **{name: most}))
     assert len(made.position) == lasting(duration)
     np.testing.assert_array_equal(made.position[0], START)
     share = minimum_jerk(np.arange(len(made.position)) / len(made.position))
@@ -165,10 +166,10 @@ def test_a_straight_way_takes_as_long_as_its_nearest_limit_asks(name, most, dura
 
 
 def test_a_way_is_no_faster_than_asked_and_slower_by_what_a_coupling_may_add():
-    goal = (START + [0.0, 0.0, 30.0], PEN_DOWN)
-    asked = way((START, PEN_DOWN), goal, FREE, speed=20.0)
+    goal = Pose(START + [0.0, 0.0, 30.0], PEN_DOWN)
+    asked = way(Pose(START, PEN_DOWN), goal, FREE, speed=20.0)
     assert len(asked.position) == lasting(1.875 * 30.0 / 20.0)
-    spared = way((START, PEN_DOWN), goal, FREE, speed=20.0, spare=10.0)
+    spared = way(Pose(START, PEN_DOWN), goal, FREE, speed=20.0, spare=10.0)
     assert len(spared.position) == lasting(1.875 * 40.0 / 20.0)
 
 
@@ -177,8 +178,8 @@ def test_a_way_is_no_faster_than_asked_and_slower_by_what_a_coupling_may_add():
     [(0.00099, 0.0, 0), (0.00101, 0.0, 1), (0.0, 1.9e-5, 0), (0.0, 2.1e-5, 1)],
 )
 def test_an_arm_that_stands_at_the_goal_needs_no_way(off, turn, count):
-    start = (START + [off, 0.0, 0.0], rotations.exp(np.array([turn, 0.0, 0.0])) @ PEN_DOWN)
-    assert bool(len(way(start, (START, PEN_DOWN), WIDE).position)) == bool(count)
+    start = Pose(START + [off, 0.0, 0.0], rotations.exp(np.array([turn, 0.0, 0.0])) @ PEN_DOWN)
+    assert bool(len(way(start, Pose(START, PEN_DOWN), WIDE).position)) == bool(count)
 
 
 def forced(force):
@@ -201,7 +202,9 @@ def test_what_is_switched_lies_on_the_strokes_own_time_from_its_first_sample():
     source = stroke(duration=2.0)
     events = (OutputEvent(3.0, "DO1", on=True), OutputEvent(3.55, "DO1", on=False))
     made = plan(
-        replace(source, t=source.t + 3.0, events=events), speed=0.5, start=(START + 5.0, PEN_DOWN)
+        replace(source, t=source.t + 3.0, events=events),
+        speed=0.5,
+        start=Pose(START + 5.0, PEN_DOWN),
     )
     assert made.t[made.lead] == 0.0
     assert [at for at, _ in made.events] == pytest.approx([made.lead, made.lead + 55.0])
@@ -226,8 +229,8 @@ def test_ways_hold_what_the_strokes_ends_say():
     assert [made.draws_at(i) for i in (1.9, 2, 12, 12.1)] == [False, True, True, False]
     np.testing.assert_array_equal(made.position[[1, 13]], [[0, 0, 0], [1, 1, 1]])
     # At the very end, and a rounding beyond.
-    np.testing.assert_array_equal(made.at(15.0)[0], [1, 1, 1])
-    np.testing.assert_array_equal(made.at(16.0)[0], [1, 1, 1])
+    np.testing.assert_array_equal(made.at(15.0).position, [1, 1, 1])
+    np.testing.assert_array_equal(made.at(16.0).position, [1, 1, 1])
     assert made.time_at(15.0) == pytest.approx(1.0)
     assert made.time_at(3.5) == pytest.approx(0.15)
     np.testing.assert_allclose(made.normal_at(99.0), [0.0, 0.0, 1.0])
@@ -255,7 +258,7 @@ def test_an_attitude_that_passes_half_a_turn_is_resampled_without_a_jump():
     assert np.linalg.norm(velocity, axis=1).max() < 1.1 * 1.875 * 0.42 / 2.0
     # Between two set-points too.
     for index in (47.5, 50.25, 53.75):
-        turn = rotations.log(made.at(index)[1] @ made.rotation[int(index)].T)
+        turn = rotations.log(made.at(index).rotation @ made.rotation[int(index)].T)
         assert np.linalg.norm(turn) < 0.02
 
 
@@ -269,6 +272,8 @@ def test_a_plan_without_a_normal_says_so():
 @pytest.mark.parametrize(("distance", "goes"), [(0.9990, False), (1.0, True), (1.001, True)])
 def test_a_micrometre_is_gone_and_less_is_not(distance, goes):
     goal = np.array([distance * planning._AT_START, 0.0, 0.0])
-    made = straight("approach", (np.zeros(3), PEN_DOWN), (goal, PEN_DOWN), 0.02, WIDE, 20.0)
-    assert gap((np.zeros(3), PEN_DOWN), (goal, PEN_DOWN))[0] == distance * planning._AT_START
+    made = straight("approach", Pose(np.zeros(3), PEN_DOWN), Pose(goal, PEN_DOWN), 0.02, WIDE, 20.0)
+    assert (
+        Pose(np.zeros(3), PEN_DOWN).apart(Pose(goal, PEN_DOWN))[0] == distance * planning._AT_START
+    )
     assert (len(made.position) > 0) == goes

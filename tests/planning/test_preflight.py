@@ -5,7 +5,8 @@ import pytest
 
 from dmpcli.errors import RefusedError
 from dmpcli.planning import preflight, transfers
-from dmpcli.planning.plan import PlannedStroke
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import LENGTH, PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 from tests.minimum_jerk import minimum_jerk
 
@@ -30,7 +31,9 @@ def test_peaks_are_those_of_the_closed_form():
     """Straight minimum jerk: 1.875 L/T, 5.7735 L/T², 60 L/T³."""
     source = stroke()
     u = (START[0] - source.position[:, 0])[:, None]
-    straight = PlannedStroke("0", source.t, START - u * np.array([1.0, 0, 0]), source.rotation)
+    straight = StrokeTrajectory(
+        source.t, START - u * np.array([1.0, 0, 0]), source.rotation, id="0"
+    )
     checks = by_name(preflight.within_limits(plan(straight), straight, WIDE))
     assert checks["speed"].value == pytest.approx(1.875 * LENGTH / 10, rel=1e-3)
     assert checks["acceleration"].value == pytest.approx(5.7735 * LENGTH / 100, rel=1e-2)
@@ -96,7 +99,7 @@ def test_the_approach_is_checked_too():
     source = stroke()
     outside = START + np.array([20.0, 0.0, 0.0])
     limits = dataclasses.replace(WIDE, workspace=(-900.0, START[0] + 1, 0.0, 900.0, -100.0, 100.0))
-    made = plan(source, start=(outside, PEN_DOWN), limits=limits)
+    made = plan(source, start=Pose(outside, PEN_DOWN), limits=limits)
     checks = preflight.within_limits(made, source, limits)
     assert failed(checks) == ["distance outside the workspace in x"]
 
@@ -133,7 +136,7 @@ def test_end_velocity_is_that_of_the_motion_and_goes_with_the_speed():
     """v(t) = 2 + 3 t: the parabola through three samples is exact."""
     t = np.arange(50) * 0.02
     position = START + (2.0 * t + 1.5 * t**2)[:, None] * np.array([0.6, 0.8, 0.0])
-    source = PlannedStroke("0", t, position)
+    source = StrokeTrajectory(t, position, id="0")
     start, end = preflight.at_rest(source, 1.0, 0.02, WIDE)
     assert start.value == pytest.approx(2.0)
     assert end.value == pytest.approx(2.0 + 3.0 * t[-1])
@@ -158,10 +161,10 @@ def test_the_peak_of_a_stroke_is_told_by_its_own_time_and_row_whatever_leads_to_
     """Straight minimum jerk is fastest half-way, row 7 + 250, and bends most at 0.2113 of it."""
     source = stroke(first_row=7)
     way = LENGTH * minimum_jerk(source.t / 10.0)
-    straight = PlannedStroke(
-        "0", source.t, START + way[:, None] * [1.0, 0.0, 0.0], source.rotation, None, 7
+    straight = StrokeTrajectory(
+        source.t, START + way[:, None] * [1.0, 0.0, 0.0], source.rotation, None, first_row=7, id="0"
     )
-    for start, lead in (((START, PEN_DOWN), 0), ((START + [0.0, 60.0, 0.0], PEN_DOWN), 50)):
+    for start, lead in ((Pose(START, PEN_DOWN), 0), (Pose(START + [0.0, 60.0, 0.0], PEN_DOWN), 50)):
         made = plan(straight, start=start, approach=100.0)
         assert made.lead >= lead
         checks = by_name(preflight.within_limits(made, straight, WIDE))
@@ -209,7 +212,7 @@ def test_the_speed_that_is_advised_goes_with_the_root_of_what_is_too_much(name, 
 def test_a_way_that_breaks_a_limit_is_told_by_its_name_and_has_no_row():
     source = stroke()
     away = START + [0.0, 60.0, 0.0]
-    made = plan(source, start=(away, PEN_DOWN), approach=100.0)
+    made = plan(source, start=Pose(away, PEN_DOWN), approach=100.0)
     limits = dataclasses.replace(WIDE, speed=50.0)
     check = by_name(preflight.within_limits(made, source, limits))["speed"]
     assert (check.t, check.row, check.place) == (None, None, "in the approach")
@@ -241,7 +244,7 @@ def test_each_side_of_the_workspace_is_kept_to_the_last_bit(axis, side):
 def test_a_transfer_that_leaves_the_workspace_may_be_lowered():
     source = stroke(normal=(0.0, 0.0, 1.0))
     ways = transfers.TransferOptions(20.0, 100.0, 50.0, 20.0)
-    [made] = transfers.plans([source], 0.02, 1.0, WIDE, (START, PEN_DOWN), True, ways)
+    [made] = transfers.plans([source], 0.02, 1.0, WIDE, Pose(START, PEN_DOWN), True, ways)
     box = (-900.0, 900.0, -900.0, 900.0, -100.0, START[2] + 15.0)
     checks = preflight.within_limits(made, source, dataclasses.replace(WIDE, workspace=box))
     [bad] = [c for c in checks if not c.passed]
@@ -252,7 +255,7 @@ def test_a_transfer_that_leaves_the_workspace_may_be_lowered():
 
 def test_two_samples_tell_their_straight_velocity_and_three_a_parabolas():
     t = np.array([1.0, 1.5])
-    short = PlannedStroke("0", t, np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]), first_row=9)
+    short = StrokeTrajectory(t, np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]), first_row=9, id="0")
     start, end = preflight.at_rest(short, 1.0, 0.02, WIDE)
     assert start.value == pytest.approx(10.0)
     assert end.value == pytest.approx(10.0)
@@ -261,6 +264,6 @@ def test_two_samples_tell_their_straight_velocity_and_three_a_parabolas():
     assert "--ease-out S, which brings it to rest" in end.remedy
     uneven = np.array([0.0, 0.1, 0.4])
     y = (2.0 * uneven + 3.0 * uneven**2)[:, None] * [1.0, 0.0, 0.0]
-    start, end = preflight.at_rest(PlannedStroke("0", uneven, y), 1.0, 0.02, WIDE)
+    start, end = preflight.at_rest(StrokeTrajectory(uneven, y, id="0"), 1.0, 0.02, WIDE)
     assert start.value == pytest.approx(2.0)
     assert end.value == pytest.approx(2.0 + 6.0 * 0.4)

@@ -13,9 +13,9 @@ from dmpcli.instruments.protocols import RobotState
 from dmpcli.kinematics import chain, inverse, models
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import preflight
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.settings.execute import ExecuteSettings
 from dmpcli.simulation.mock import Lab, MockServo
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import PEN_DOWN, START, WIDE, plan, refuse_any, stroke
 
 EC66 = models.model("ec66")
@@ -141,7 +141,7 @@ def test_the_model_that_is_named_is_taken_where_the_robot_tells_none():
 
 def test_a_stroke_without_orientation_is_judged_as_the_arm_holds_it():
     source = stroke(rotated=False)
-    upside_down = PlannedStroke(source.id, source.t, source.position)
+    upside_down = StrokeTrajectory(source.t, source.position, id=source.id)
     made, checks = execution.prepare(
         upside_down, ExecuteSettings(), standing(source.position[0]), REACH
     )

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.planning import transfers
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.planning.transfers import TransferOptions
+from dmpcli.spatial.pose import Pose
+from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.streaming_fakes import PEN_DOWN, WIDE
 from tests.minimum_jerk import minimum_jerk
 
@@ -27,8 +28,8 @@ def line(name, start, goal, normal=(0.0, 0.0, 1.0), turn=0.0, seconds=4.0):
     start, goal = np.asarray(start, float), np.asarray(goal, float)
     spin = Rotation.from_rotvec(np.outer(turn * u, [0.0, 0.0, 1.0])).as_matrix()
     n = np.asarray(normal, float) / np.linalg.norm(normal)
-    return PlannedStroke(
-        name, t, start + u[:, None] * (goal - start), spin @ PEN_DOWN, np.tile(n, (len(t), 1))
+    return StrokeTrajectory(
+        t, start + u[:, None] * (goal - start), spin @ PEN_DOWN, np.tile(n, (len(t), 1)), id=name
     )
 
 
@@ -167,11 +168,11 @@ def test_without_normals_the_pen_leaves_back_along_the_tool():
 
 
 def test_an_arm_that_stands_elsewhere_rises_before_it_crosses():
-    away = (np.array([30.0, -200.0, 0.0]), PEN_DOWN)
+    away = Pose(np.array([30.0, -200.0, 0.0]), PEN_DOWN)
     p = toured(LEVEL, start=away, near=False, approach=15.0)[0]
     way = p.position[: p.lead + 1]
-    np.testing.assert_allclose(way[0], away[0])
-    here, there = away[0][:2], LEVEL[0].position[0, :2]
+    np.testing.assert_allclose(way[0], away.position)
+    here, there = away.position[:2], LEVEL[0].position[0, :2]
     beside = np.minimum(
         np.linalg.norm(way[:, :2] - here, axis=1), np.linalg.norm(way[:, :2] - there, axis=1)
     )
@@ -180,7 +181,7 @@ def test_an_arm_that_stands_elsewhere_rises_before_it_crosses():
 
 
 def test_an_arm_that_stands_higher_does_not_go_down_to_cross():
-    high = (np.array([30.0, -200.0, 150.0]), PEN_DOWN)
+    high = Pose(np.array([30.0, -200.0, 150.0]), PEN_DOWN)
     p = toured(LEVEL, start=high, near=False)[0]
     way = p.position[: p.lead]
     crossing = np.linalg.norm(way[:, :2] - LEVEL[0].position[0, :2], axis=1) > 1e-6
@@ -260,19 +261,21 @@ def test_any_tour_is_continuous_keeps_every_limit_and_stays_clear_of_the_work(en
 
 
 def test_an_arm_that_stands_higher_crosses_where_it_is():
-    start = (np.array([30.0, 80.0, 55.0]), PEN_DOWN)
+    start = Pose(np.array([30.0, 80.0, 55.0]), PEN_DOWN)
     position, _, phases = whole(toured(LEVEL[:1], start, near=False))
     crossing = position[phases == "transfer"]
     assert crossing[:, 2].max() == pytest.approx(55.0)
     across = crossing[np.linalg.norm(np.diff(crossing[:, :2], axis=0, prepend=0.0), axis=1) > 0.01]
     np.testing.assert_allclose(across[1:, 2], 55.0, atol=1e-6)
-    low, _, phases = whole(toured(LEVEL[:1], (start[0] * [1, 1, 0], PEN_DOWN), near=False))
+    low, _, phases = whole(
+        toured(LEVEL[:1], Pose(start.position * [1, 1, 0], PEN_DOWN), near=False)
+    )
     assert low[phases == "transfer"][:, 2].max() == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize("near", [True, False])
 def test_only_the_way_to_the_first_stroke_is_as_slow_as_asked(near):
-    start = (np.array([0.5, 0.0, 0.0]) if near else np.array([0.0, 90.0, 0.0]), PEN_DOWN)
+    start = Pose(np.array([0.5, 0.0, 0.0]) if near else np.array([0.0, 90.0, 0.0]), PEN_DOWN)
     plans = toured(LEVEL, start, near=near, approach=6.0)
     onto = plans[0].position[: plans[0].lead + 1]
     assert speed_of(onto).max() <= 6.0
@@ -307,7 +310,7 @@ def test_a_coupling_makes_the_retract_slower_by_what_it_may_add():
 
 def test_a_single_stroke_may_end_where_it_ends():
     [made] = transfers.plans(
-        LEVEL[:1], PERIOD, 1.0, WIDE, (np.array([0.0, 90.0, 0.0]), PEN_DOWN), False, WAYS, None,
+        LEVEL[:1], PERIOD, 1.0, WIDE, Pose(np.array([0.0, 90.0, 0.0]), PEN_DOWN), False, WAYS, None,
         leave=False,
     )  # fmt: skip
     assert made.last == len(made) - 1

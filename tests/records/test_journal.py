@@ -127,6 +127,7 @@ def test_a_head_that_lacks_something_is_named(missing, instead):
         journal.read(Source("a", sink.getvalue().to_pybytes()))
 
 
+@pytest.mark.slow
 def test_cut_anywhere_every_whole_batch_is_recovered(tmp_path):
     rows, content, sizes = written(tmp_path / "a.journal", batches=(3, 1, 4))
     counts = np.cumsum([0, 3, 1, 4])

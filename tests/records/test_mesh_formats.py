@@ -296,6 +296,7 @@ def test_ply_obj_and_off_hold_the_same_triangles(faces, form):
         assert other.remarks == ours.remarks
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.sampled_from(FORMS), st.integers(0, 10**6), st.integers(0, 255), st.booleans())
 def test_a_damaged_byte_is_read_or_refused_and_nothing_else(form, at, value, shorten):

@@ -109,6 +109,7 @@ def end():
     os._exit(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deed", [crash, end])
 def test_a_process_that_dies_is_told_by_its_mutation_and_the_rest_goes_on(deed, tmp_path):
     count = 400

@@ -41,6 +41,7 @@ def at(key):
     return ObjectPath(f"s3://{BUCKET}", key)
 
 
+@pytest.mark.slow
 def test_what_was_put_is_there_under_its_name_and_nothing_else(store):
     keys = ["a", "folder/b.csv", "trip data/a+b%20c?d#é@:.html"]
     for key in keys:
@@ -80,6 +81,7 @@ def test_an_object_that_is_missing_is_a_missing_file(store):
         file_io.read(f"s3://{BUCKET}/no")
 
 
+@pytest.mark.slow
 def test_an_object_is_read_piece_by_piece_as_a_file_is(store):
     at("t").put(b"one\ntwo\nthree\n" * 20_000)
     with at("t").open("rb") as stream:
@@ -180,6 +182,7 @@ COMPLAINTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "code", "said"), COMPLAINTS, ids=lambda one: str(one))
 def test_what_a_store_complains_of_is_told_by_its_code_alone(store, monkeypatch, fault, code, said):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")

@@ -3,7 +3,6 @@
 import io
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,6 +31,8 @@ def test_pairs_without_ids_are_numbered_and_without_duration_take_the_skills():
 
 
 def test_parquet_tables_and_orientations_are_read():
+    import pandas as pd
+
     columns = HEADER.split(",") + ["id", "duration", "rx0", "ry0", "rz0"]
     frame = pd.DataFrame([[1, 2, 3, 4, 5, 6, "a", 2.5, 3.0, 0.1, 0.2]], columns=columns)
     stream = io.BytesIO()

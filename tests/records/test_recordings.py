@@ -3,7 +3,6 @@
 import io
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -41,6 +40,8 @@ def test_comments_blank_lines_and_a_byte_order_mark_are_passed_over():
 
 
 def test_a_parquet_file_of_another_program_is_read():
+    import pandas as pd
+
     stream = io.BytesIO()
     pd.DataFrame(np.column_stack([T, XYZ]), columns=list("txyz")).to_parquet(stream)
     np.testing.assert_array_equal(stroke(Source("a", stream.getvalue())).position, XYZ)

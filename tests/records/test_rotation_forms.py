@@ -17,6 +17,7 @@ def test_there_are_the_twenty_four_orders():
     assert len(set(ORDERS)) == 24
 
 
+@pytest.mark.slow
 @given(st.sampled_from(ORDERS), angles)
 def test_any_order_gives_the_product_of_its_turns(order, turns):
     R = rotation_forms.matrices(order, np.array([turns]))[0]
@@ -30,6 +31,7 @@ def test_any_order_gives_the_product_of_its_turns(order, turns):
     np.testing.assert_allclose(R, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 @given(angles)
 def test_an_extrinsic_order_is_the_intrinsic_one_backward(turns):
     values = np.array([turns])
@@ -41,6 +43,7 @@ def test_an_extrinsic_order_is_the_intrinsic_one_backward(turns):
         )
 
 
+@pytest.mark.slow
 @given(angles)
 def test_words_are_orders(turns):
     values = np.array([turns])
@@ -52,6 +55,7 @@ def test_words_are_orders(turns):
         )
 
 
+@pytest.mark.slow
 @given(angles)
 def test_vectors_quaternions_and_matrices_are_scipys(turns):
     R = Rotation.from_rotvec([turns])

@@ -66,6 +66,7 @@ def test_a_skill_without_a_force_profile_keeps_its_version_and_its_bytes():
     assert encoded(replace(paper_stroke(), contact_force=force))[1] == encoded(paper_stroke())[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(json_schema.SCHEMAS))
 def test_the_published_json_schema_is_the_models(name):
     published = (json_schema.folder() / f"{name}.schema.json").read_text(encoding="utf-8")

@@ -149,6 +149,7 @@ KEYS = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(KEYS)
 def test_an_object_path_answers_as_a_path_of_this_machine_does(parts):
     here, there = Path("/bucket", *parts), ObjectPath("s3://bucket")

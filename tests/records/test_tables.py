@@ -17,6 +17,7 @@ def both(text):
     return tables.read(source), tables.read(source, texts=("id",))
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(CELLS, CELLS), min_size=1, max_size=20))
 def test_both_ways_give_the_same_numbers(rows):
     plain, quick = both("a,b\n" + "\n".join(f"{a},{b}" for a, b in rows) + "\n")

@@ -102,6 +102,7 @@ def test_the_first_version_is_read():
     assert tool.decode(changed(version=1, calibration=None)).weight == PEN.weight
 
 
+@pytest.mark.slow
 @given(st.integers(0, 1000))
 def test_the_geometry_survives_the_facts_of_another_file(seed):
     rng = np.random.default_rng(seed)

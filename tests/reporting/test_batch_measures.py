@@ -177,6 +177,7 @@ def test_on_a_mesh(tmp_path):
     assert np.isnan(column(alike(folder, taught()), "wave_height")).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["modified", "original"])
 @pytest.mark.parametrize("count", [1, 5])
 def test_on_a_cylinder(tmp_path, model, count):
@@ -197,6 +198,7 @@ def test_on_a_cylinder(tmp_path, model, count):
     assert np.isfinite(column(table, "surface_length_change")).all()
 
 
+@pytest.mark.slow
 def test_parts_measured_apart_are_measured_alike(tmp_path):
     folder = put_batch(tmp_path / "b", [strokes(9), strokes(7, seed=5)], ["line 20: no geodesic"])
     batch, _ = dataset.read(folder)

@@ -61,6 +61,7 @@ def original():
     return strokes_of(record, "original")[0]
 
 
+@pytest.mark.slow
 def test_a_stroke_on_the_mesh_is_measured_along_it(ground):
     # Chords of 2 mm on a radius of 86.774 mm lie 0.006 mm inside it.
     row = row_of(placed([modified(49.98)], ground, taught())[0], taught())

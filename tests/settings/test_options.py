@@ -85,6 +85,7 @@ def test_the_front_door_says_of_a_command_what_the_command_says(command):
     assert first.startswith(cli.COMMANDS[command])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "one"), OPTIONS, ids=lambda v: getattr(v, "flag", v))
 def test_help_states_unit_and_default_of_every_option(command, one):
     found = parameter(command, one.flag)

@@ -143,6 +143,7 @@ def test_the_sensor_feels_hand_plate_weight_and_zero_through_its_lever():
     np.testing.assert_allclose(outside, lab.hand.value, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_noise_has_the_stated_spread_and_the_seed_decides_it():
     def readings(seed):
         clock, _, _, sensor = bench(seed=seed)

@@ -22,6 +22,7 @@ def test_six_numbers_turn_about_x_then_the_turned_y_then_the_turned_z():
     np.testing.assert_allclose(pose.rotation, expected, atol=1e-15)
 
 
+@pytest.mark.slow
 @given(six, six)
 def test_composition_and_inverse_are_scipys(a, b):
     one, other = Pose.of(100 * a), Pose.of(b)

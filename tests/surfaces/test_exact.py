@@ -56,6 +56,7 @@ def test_walks_follow_the_geodesic_equation(name):
         np.testing.assert_allclose(walked.direction[i], end[3:], atol=1e-6)
 
 
+@pytest.mark.slow
 @every_surface
 @given(seed=st.integers(0, 10_000), length=st.floats(-90.0, 90.0))
 def test_walking_there_and_back_is_the_identity(name, seed, length):

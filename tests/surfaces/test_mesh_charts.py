@@ -89,6 +89,7 @@ def test_the_order_of_vertices_faces_and_pairs_does_not_matter():
     np.testing.assert_allclose(back.lengths[::-1], charts.lengths, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pair_alone_is_drawn_as_among_others():
     mesh, case = cases.mesh("saddle", 2_000), cases.case("saddle", 5, 100)
     scale = np.array([1.0, 0.5, 0.7, 0.35, 0.9])[:, None]

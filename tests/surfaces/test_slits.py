@@ -75,6 +75,7 @@ def two_boxes():
     return np.concatenate([V, V + [30.0, 0.0, 10.0]]), np.concatenate([F, F[:, ::-1] + len(V)])
 
 
+@pytest.mark.slow
 def test_solids_that_share_an_edge_are_each_closed_and_drawn_on():
     found = mended(*two_boxes())
     mesh = Mesh(found.V, found.F)

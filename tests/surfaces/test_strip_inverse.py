@@ -40,6 +40,7 @@ def wave(charts, wide=25.0, height=0.0):
     return np.stack([u, v, np.full(u.shape, height)], axis=-1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
 def test_what_a_chart_drew_is_found_on_its_own_nodes(bumpy, height):
     charts = laid(bumpy)
@@ -53,6 +54,7 @@ def test_what_a_chart_drew_is_found_on_its_own_nodes(bumpy, height):
     assert found.miss.max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_it_agrees_with_the_search_that_lifts_what_it_tries(bumpy):
     charts = laid(bumpy)
     drawn = charts.lift(wave(charts, wide=18.0))
@@ -63,6 +65,7 @@ def test_it_agrees_with_the_search_that_lifts_what_it_tries(bumpy):
     np.testing.assert_allclose(quick.axes, slow.axes, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_stroke_is_found_alike_alone_and_among_others(bumpy):
     charts = laid(bumpy)
     position = charts.lift(wave(charts)).position

@@ -50,6 +50,7 @@ def test_what_becomes_of_a_statement(line, after):
     assert changed(line) == after
 
 
+@pytest.mark.slow
 def test_every_mutant_of_a_module_compiles_and_differs_from_it():
     path = ROOT / "dmpcli/metrics/wave_height.py"
     text = path.read_text()

@@ -134,6 +134,7 @@ def test_a_python_without_venv_is_one_line_with_debians_package(place, module):
     assert f"without its module {module}: on Debian and Ubuntu sudo apt install {package}" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("venv", ["/dev/null/venv", "/proc/venv"])
 def test_a_place_that_cannot_be_written_is_one_line(place, venv):
     assert "cannot be written" in place.refused(venv)

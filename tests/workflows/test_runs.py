@@ -57,6 +57,7 @@ def test_a_recording_has_the_bytes_that_record_writes(tmp_path, taught):
     np.testing.assert_array_equal(named.position, taught.position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -211,7 +212,7 @@ def test_values_without_a_file_are_called_what_they_are(taught, drawn):
     for strokes, said, words in [
         ((), {}, "no stroke to report"),
         ((taught, drawn), {"names": ("one", "one")}, "different names"),
-        ((3.0,), {}, "a float is nothing"),
+        ((3.0,), {}, "float is no demonstration"),
         ((taught,), {"output": REFERENCE}, "is a file, -o needs"),
     ]:
         with pytest.raises(dmpcli.InputError, match=words):

@@ -163,6 +163,7 @@ def mutated(rng, said):
     return b'{"jsonrpc":"2.0","result":"[NaN,1,2,3,4,5]","id":7}'
 
 
+@pytest.mark.slow
 def test_ten_thousand_damaged_replies_name_their_fault_or_are_a_valid_reply():
     rng = random.Random(4)
     told = [30.25, -80.5, 100.125, -110.0, -90.0, 20.75]

@@ -247,6 +247,7 @@ def test_another_motion_is_ended_only_where_that_is_asked_for(robot, arm, caplog
     servo.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("monitor", "mode", "detail"),
     [

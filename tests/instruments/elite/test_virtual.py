@@ -16,12 +16,13 @@ from dmpcli.errors import DmpError, InstrumentError, RefusedError
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.kinematics import chain, models
 from dmpcli.planning.limits import Limits
-from dmpcli.planning.plan import PlannedStroke, make
+from dmpcli.planning.plan import make
 from dmpcli.simulation.elite_server import faults
 from dmpcli.simulation.elite_server.lab import LabParameters, VirtualLab
 from dmpcli.simulation.elite_server.service import ControllerService
 from dmpcli.simulation.mock import PEN
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 START = np.array([-450.0, -120.0, 150.0])
 LIMITS = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
@@ -52,7 +53,7 @@ class Bench:
         s = t / duration
         u = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         way = state.position + u[:, None] * [20.0, 10.0, 0.0]
-        stroke = PlannedStroke("0", t, way, np.broadcast_to(state.rotation, (101, 3, 3)))
+        stroke = StrokeTrajectory(t, way, np.broadcast_to(state.rotation, (101, 3, 3)), id="0")
         stroke = replace(stroke, events=events)
         here = (state.position, state.rotation)
         plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)

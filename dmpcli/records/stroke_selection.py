@@ -1,4 +1,4 @@
-"""The strokes of a trajectory file, or of the folder of a batch, that are to be executed."""
+"""Some strokes, in the order asked for, of a trajectory file or of the folder of a batch."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,31 +8,16 @@ import numpy as np
 
 from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
-from dmpcli.planning.plan import PlannedStroke
 from dmpcli.records import file_io, record, schemas
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Record
 from dmpcli.records.schemas import OK
 from dmpcli.records.storage import Location, located
 from dmpcli.records.trajectory_reader import rows_by_id, stored
+from dmpcli.spatial.trajectory import StrokeTrajectory
 
 NAMED = 5
 """Ids that a message names."""
-
-
-@dataclass(frozen=True)
-class FoundStroke:
-    """A stroke and what its file says beside it.
-
-    Attributes
-    ----------
-    stroke : PlannedStroke
-    facts : dict
-        Of the file, with the start, goal and normal of a batch's pair.
-    """
-
-    stroke: PlannedStroke
-    facts: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -41,7 +26,7 @@ class StrokeSelection:
 
     Attributes
     ----------
-    found : tuple of FoundStroke
+    strokes : tuple of StrokeTrajectory
         In the order in which they are drawn; at least one.
     failed : dict of str
         Pairs of the batch without trajectory that were passed over, and why each has none.
@@ -51,21 +36,14 @@ class StrokeSelection:
         Whether it is a batch's folder.
     """
 
-    found: tuple[FoundStroke, ...]
+    strokes: tuple[StrokeTrajectory, ...]
     failed: dict[str, str]
     entries: tuple[dict[str, str], ...]
     folder: bool
 
-    @property
-    def strokes(self) -> list[PlannedStroke]:
-        """The strokes alone."""
-        return [found.stroke for found in self.found]
-
-
-def without_events(batch: StrokeSelection) -> StrokeSelection:
-    """Return the strokes without the outputs that they switch."""
-    found = tuple(replace(one, stroke=replace(one.stroke, events=())) for one in batch.found)
-    return replace(batch, found=found)
+    def without_events(self) -> "StrokeSelection":
+        """Return the strokes without the outputs that they switch."""
+        return replace(self, strokes=tuple(replace(one, events=()) for one in self.strokes))
 
 
 def find(path: str | Source, wanted: Sequence[str] = ()) -> StrokeSelection:
@@ -91,8 +69,8 @@ def find(path: str | Source, wanted: Sequence[str] = ()) -> StrokeSelection:
         return _in_folder(folder, wanted)
     source, rows = _grouped(path)
     names = _chosen(wanted, list(rows), source.name)
-    found = tuple(_found(source, name, rows[name], {}) for name in names)
-    return StrokeSelection(found, {}, (record.input_of("trajectory", source),), False)
+    strokes = tuple(_stroke(source, name, rows[name], {}) for name in names)
+    return StrokeSelection(strokes, {}, (record.input_of("trajectory", source),), False)
 
 
 def _in_folder(folder: Location, wanted: Sequence[str]) -> StrokeSelection:
@@ -127,7 +105,7 @@ def _in_folder(folder: Location, wanted: Sequence[str]) -> StrokeSelection:
                     f"{source.name}: holds no stroke {name}, which {file_io.TABLE} says is there; "
                     "generalize the batch again"
                 )
-            found[name] = _found(source, name, rows[name], _pair_facts(pairs, rows_of[name]))
+            found[name] = _stroke(source, name, rows[name], _pair_facts(pairs, rows_of[name]))
     strokes = tuple(found[name] for name in names)
     return StrokeSelection(strokes, {} if wanted else failed, tuple(entries), True)
 
@@ -165,18 +143,7 @@ def _grouped(path: str | Source) -> tuple[Record, dict[str, Integers]]:
     return source, rows_by_id(source.columns["id"])
 
 
-def _found(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> FoundStroke:
+def _stroke(source: Record, name: str, rows: Integers, more: Mapping[str, Any]) -> StrokeTrajectory:
     if len(rows) < 2:
         raise InputError(f"{source.name}: stroke {name} has one row; a motion needs at least two")
-    one = stored(source, name, rows, source.provenance.facts | dict(more))
-    stroke = PlannedStroke(
-        name,
-        one.t,
-        one.position,
-        one.rotation,
-        one.normal,
-        one.first_row,
-        one.events,
-        one.force,
-    )
-    return FoundStroke(stroke, one.facts)
+    return stored(source, name, rows, source.provenance.facts | dict(more))
