@@ -102,11 +102,11 @@ def surfaces_that_end_or_jump():
 
 @KEPT.case
 def runs_along_a_plan():
-    away = START + np.array([30.0, -40.0, 10.0])
+    away, turned = START + np.array([30.0, -40.0, 10.0]), exp(np.array([0, 0.1, 0.2])) @ PEN_DOWN
     plans = [
         plan(stroke(2.0)),
         plan(stroke(1.5, 73.0, 0.6), 0.008, 0.5),
-        plan(stroke(2.0, normal=(0, 0, 1)), start=(away, exp(np.array([0, 0.1, 0.2])) @ PEN_DOWN)),
+        plan(stroke(2.0, normal=(0, 0, 1)), start=Pose(away, turned)),
     ]
     found: list = []
     for made in plans:
