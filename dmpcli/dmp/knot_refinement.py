@@ -29,6 +29,11 @@ _SMALLEST, _SMALLEST_AT_END = 1.0, 2.0
 # Chance by which noise alone makes a place worth a trial, and by which a trial may succeed by it:
 # any of all, and each beside intervals that were halved, as a corner's mostly are not enough.
 _TRIED, _ANYWHERE, _BESIDE = 1e-2, 5e-3, 3e-3
+# Second differences of samples, in standard deviations of the noise, from which on intervals may
+# hold less than two: what such ones follow of the noise is 2.4 on each axis.
+_BENT = 15.0
+# Samples, less rounding, that an interval holds whose halves hold two.
+_HALVES_HOLD_TWO = 4.0 - 1e-8
 # What a coefficient costs, in variances (Mallows).
 _COST = 2.0
 # Intervals within which one place is tried at a time, and within which its squares are counted.
@@ -152,7 +157,8 @@ def _tried(
         for _, on in places:
             marked[on] = True
         trial, changed = _split(design, marked, x)
-        less = np.sum(residual**2 - (x - trial.values(changed)) ** 2, axis=1)
+        values = trial.values(changed)
+        less = np.sum(residual**2 - (x - values) ** 2, axis=1)
         sums = np.concatenate([[0.0], np.cumsum(less)])
         marked[:] = False
         for at, on in places:
@@ -164,6 +170,10 @@ def _tried(
             freedom = axes * len(on)
             chance = float(chdtrc(freedom, max(gain, 0.0)))
             beside = width[max(0, at - 3) : at + 4].min() < _SHORT * longest
+            if width[on].min() < _HALVES_HOLD_TWO * design.step:
+                bend = np.linalg.norm(np.diff(values[first:end], 2, axis=0), axis=1)
+                if bend.max(initial=0.0) < _BENT * noise.largest:
+                    continue
             marked[on] = chance < (_BESIDE if beside else _ANYWHERE / K)
         if not marked.any():
             break

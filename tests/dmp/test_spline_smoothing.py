@@ -80,8 +80,8 @@ def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stroke", [corners, pen_lift])
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("stroke", [corners, pen_lift])
 def test_corners_and_lifts_stay_though_the_rest_is_smooth(stroke, sigma):
     t, truth = stroke()
     worst = []
@@ -92,6 +92,14 @@ def test_corners_and_lifts_stay_though_the_rest_is_smooth(stroke, sigma):
         worst.append(off.max())
     assert np.median(worst) <= 4.4 * sigma
     assert max(worst) <= 5.0 * sigma
+
+
+def test_at_corners_noise_does_not_accelerate():
+    """Beside the spline through the exact samples; these seeds went to 1.5 to 1.9 times."""
+    t, truth = corners()
+    true = peak(smoothed(t, truth)(t, 2))
+    for seed in (0, 19, 24, 26, 27):
+        assert peak(smoothed(t, noisy(truth, 0.1, seed))(t, 2)) <= 1.3 * true
 
 
 def polygon(seed, speed=50.0, legs=8):
@@ -179,7 +187,7 @@ def test_a_slow_stroke_on_a_lattice_is_no_staircase():
     spline = smoothed(t, np.round(truth / 0.5) * 0.5)
     true = peak(smooth(truth, 30.0, noise.estimate(truth))(t, 2))
     assert peak(spline(t, 2)) <= 1.5 * true
-    assert errors(spline, t, truth).max() <= 0.1
+    assert errors(spline, t, truth).max() <= 0.25
 
 
 def test_a_stroke_in_motion_at_its_ends_keeps_its_velocity():
