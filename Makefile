@@ -137,6 +137,7 @@ bench: $(VENV)/installed
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python -m benchmarks.human_strokes
 	$(BIN)/python -m benchmarks.noise
+	$(BIN)/python -m benchmarks.noise_bounds
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python -m benchmarks.csv_reading

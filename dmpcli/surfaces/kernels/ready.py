@@ -67,5 +67,5 @@ def load() -> None:
     samples.lift(facets, strip, flat, flat, one, number, where, feet)
     facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)
     frame = np.tile(np.eye(3), (1, 3, 1, 1))
-    smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1)
+    smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1, 0.1)
     rotations.euler_of_paths(frame[:, :1], frame)
