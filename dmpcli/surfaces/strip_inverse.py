@@ -14,8 +14,9 @@ concave one, none leads to points of the edge; such strokes are left to `tangent
 near as it can.
 """
 
+import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +24,8 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, length, unit
 from dmpcli.surfaces import strip_chart
 from dmpcli.surfaces.mesh_charts import MeshCharts
-from dmpcli.surfaces.strip_grid import Grid, Nodes, corners, walk_nodes
+from dmpcli.surfaces.strip_chart import WalkedStrips
+from dmpcli.surfaces.strip_grid import CentreLines, Grid, Nodes, corners, walk_nodes
 from dmpcli.surfaces.surface import Status
 from dmpcli.surfaces.tangential import SETTLED
 
@@ -31,8 +33,14 @@ HIGHEST = 0.5
 """Positions farther off the mesh are left to `tangential`, mm: their normals spread."""
 
 _PASSES, _STEPS, _FEET = 4, 8, 6
-# Where coordinates change by less than this the nodes need not be walked again, mm.
-_SAME_NODES = 1e-4
+# Where coordinates change by less than this the nodes need not be walked again, mm: a change of
+# 1e-4 mm would leave an error of up to 1e-7 mm. The last pass may leave the second.
+_SAME_NODES = (1e-9, 1e-4)
+# Widths of strips whose nodes need not be walked again differ by no more than this, mm. And so
+# much, in nodes, may coordinates move that are guessed so well, or known.
+_SAME_WIDTH, _BESIDE = (2e-7, 1e-4), (0.1, 0.02)
+# Samples that tell the width.
+_FARTHEST = 8
 # What a step leaves, and how near a foot must come, mm.
 _STILL, _ON_FOOT = 1e-9, 1e-8
 # What is left on nodes that will be walked again, mm.
@@ -86,14 +94,18 @@ def found(charts: MeshCharts, position: Floats) -> Found:
     near = (np.abs(height) <= HIGHEST).all(axis=1) & np.isfinite(foot).all(axis=(1, 2))
     rows, foot, facet, height = rows[near], foot[near], facet[near], height[near]
     some = charts.rows(rows)
-    at = _guessed(some, foot)
-    good = _settled(some, at, foot, facet)
+    walked = None
+    if charts.mesh.compiled:
+        at, good, walked = _settled_at_once(some, foot, facet)
+    else:
+        at = _guessed(some, foot)
+        good = _settled(some, at, foot, facet)
     rows, height, at = rows[good], height[good], at[good]
     coordinates = np.concatenate([at, height[..., None]], axis=-1)
     if len(rows) == 0:
         shape = 0, position.shape[1]
         return Found(rows, coordinates, np.zeros((*shape, 3, 3)), np.zeros(shape))
-    lift = charts.rows(rows).lift(coordinates)
+    lift = charts.rows(rows).lift(coordinates, walked)
     gap = np.einsum("btj,btjk->btk", position[rows] - lift.position, lift.axes)
     coordinates[..., 2] += gap[..., 2]
     miss = np.hypot(gap[..., 0], gap[..., 1])
@@ -104,6 +116,24 @@ def found(charts: MeshCharts, position: Floats) -> Found:
 
 def _feet(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]:
     """Feet (R, T, 3) by the smooth normal, normals of their facets, and heights (R, T), mm."""
+    if not charts.mesh.compiled:
+        return _feet_sought(charts, position)
+    from dmpcli.surfaces.kernels import inverse
+
+    foot, facet = np.empty((2, *position.shape))
+    height, doubt = np.empty(position.shape[:2]), np.empty(len(position), dtype=bool)
+    limits = inverse.FootLimits(_FEET, _ON_FOOT)
+    position = np.ascontiguousarray(position)
+    sign = charts.centre.sign
+    inverse.feet(charts.mesh.facets, position, sign, limits, foot, facet, height, doubt)
+    rows = np.flatnonzero(doubt)
+    if len(rows):
+        some = _feet_sought(charts.rows(rows), position[rows])
+        foot[rows], facet[rows], height[rows] = some
+    return foot, facet, height
+
+
+def _feet_sought(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]:
     mesh, shape = charts.mesh, position.shape
     sign = np.repeat(charts.centre.sign, shape[1], axis=0)
     given = position.reshape(-1, 3)
@@ -128,13 +158,10 @@ def _feet(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]
 
 def _guessed(charts: MeshCharts, foot: Floats) -> Floats:
     """Guesses (R, T, 2) beside the nearest nodes of the centre lines, in their axes, mm."""
-    chord = charts.target - charts.centre.origin
-    e_u = unit(chord)[:, None]
-    u = dot(foot - charts.centre.origin[:, None], e_u)[..., 0]
-    least, most = np.minimum(u.min(axis=1), 0.0), np.maximum(u.max(axis=1), charts.lengths)
     at = np.zeros((*foot.shape[:2], 2))
-    ends = np.stack([np.maximum(least, -charts.lengths), np.minimum(most, 2.0 * charts.lengths)], 1)
-    for some, strip in _strips(charts, np.stack([ends, 0.0 * ends], axis=-1), along=True):
+    ends = np.stack(_along_chord(charts, foot), axis=1)
+    nodes = np.stack([ends, 0.0 * ends], axis=-1)
+    for some, strip in _strips(charts, nodes, along=True):
         line = strip.nodes.values[:, :, strip.zero[1]]
         normal = strip.nodes.normal[:, :, strip.zero[1]]
         step = strip.step[:, 0, 0]
@@ -147,6 +174,104 @@ def _guessed(charts: MeshCharts, foot: Floats) -> Floats:
             at[i, :, 0] += dot(gap, cross(e_v, normal[k, node]))[:, 0]
             at[i, :, 1] = dot(gap, e_v)[:, 0]
     return at
+
+
+def _along_chord(charts: MeshCharts, foot: Floats) -> tuple[Floats, Floats]:
+    """From which to which u, (R,) each, strokes lie beside their centre lines by their chords, mm.
+
+    At least from start to goal, at most as far again beyond either.
+    """
+    chord = charts.target - charts.centre.origin
+    e_u = unit(chord)[:, None]
+    u = dot(foot - charts.centre.origin[:, None], e_u)[..., 0]
+    least, most = np.minimum(u.min(axis=1), 0.0), np.maximum(u.max(axis=1), charts.lengths)
+    return np.maximum(least, -charts.lengths), np.minimum(most, 2.0 * charts.lengths)
+
+
+def _settled_at_once(
+    charts: MeshCharts, foot: Floats, facet: Floats
+) -> tuple[Floats, Booleans, list[WalkedStrips]]:
+    """Coordinates (R, T, 2) over feet, by kernels; which came to rest, and their strips.
+
+    Nodes depend on a stroke by how far it swings alone: once that is known they need not be walked
+    again, for the lift neither.
+    """
+    from dmpcli.surfaces.kernels import inverse
+
+    lines, step = _centre_lines(charts, *_along_chord(charts, foot)), charts.centre.step[:, 0]
+    nodes = lines.position, lines.across, lines.normal, lines.behind, lines.ahead
+    at = inverse.guesses(*nodes, lines.zero, step.copy(), foot)
+    good, left = np.zeros(len(at), dtype=bool), np.arange(len(at))
+    reach, walked = _extent(at), []
+    for number in range(_PASSES):
+        if len(left) == 0:
+            break
+        guessed, beside = at[left], _BESIDE[min(number, 1)]
+        strayed = np.zeros(len(left), dtype=bool)
+        for some, strip in _strips(charts.rows(left), guessed, reach, lines.rows(left), beside):
+            rows = left[some]
+            at[rows], still = strip.moved(foot[rows], facet[rows], rough=number == 0)
+            strayed[some] = ~still | ~strip.covers(at[rows])
+            same = strip.same(_extent(at[rows]), reach[some], _SAME_WIDTH[number == _PASSES - 1])
+            kept = np.flatnonzero(~strayed[some] & same)
+            good[rows[kept]] = True
+            if len(kept):
+                walked.append(strip.walked(rows[kept], kept))
+        rows = left[strayed]
+        if len(rows):
+            # Nodes that were not walked led them astray: once more, with those all around.
+            at[rows] = guessed[strayed]
+            for some, strip in _strips(charts.rows(rows), at[rows], reach[strayed]):
+                at[rows[some]], _ = strip.moved(foot[rows[some]], facet[rows[some]], rough=True)
+        left = left[~good[left]]
+        # What is no number is not below it either.
+        left = left[(np.abs(_extent(at[left])) < _FAR).all(axis=(1, 2))]
+        if number == 0 and len(left):
+            _narrow(charts, at, left, foot, facet, lines)
+        reach = _extent(at[left])
+    # As they are counted among the good ones alone.
+    number_of = np.cumsum(good) - 1
+    return at, good, [replace(strips, rows=number_of[strips.rows]) for strips in walked]
+
+
+def _centre_lines(charts: MeshCharts, least: Floats, most: Floats) -> CentreLines:
+    """Walk the centre lines from u to u, (R,) each, mm, and a node beyond."""
+    step = charts.centre.step[:, 0]
+    behind = np.ceil(np.maximum(-least, 0.0) / step).astype(np.int64) + 1
+    ahead = np.ceil(np.maximum(most, 0.0) / step).astype(np.int64) + 1
+    return CentreLines.walked(charts.mesh, charts.centre, behind, np.maximum(ahead, 4))
+
+
+def _narrow(
+    charts: MeshCharts,
+    at: Floats,
+    rows: Integers,
+    foot: Floats,
+    facet: Floats,
+    lines: CentreLines,
+) -> None:
+    """Move the coordinates that swing farthest once more: they tell the width of the strips."""
+    at_once = min(_FARTHEST, at.shape[1])
+    far = np.argpartition(-np.abs(at[rows, :, 1]), at_once - 1, axis=1)[:, :at_once]
+    row = rows[:, None]
+    some_at, some_foot, some_facet = at[row, far], foot[row, far], facet[row, far]
+    some_charts, reach = charts.rows(rows), _extent(at[rows])
+    for some, strip in _strips(some_charts, some_at, reach, lines.rows(rows), _BESIDE[1]):
+        moved, still = strip.moved(some_foot[some], some_facet[some], rough=False)
+        some_at[some[still]] = moved[still]
+    at[row, far] = some_at
+
+
+def _width(at: Floats) -> Floats:
+    """How far coordinates (R, T, 2) or their extents swing, shape (R,), mm."""
+    return strip_chart.widths(at[..., 1])[:, 0]
+
+
+def _extent(at: Floats) -> Floats:
+    """Least and largest u and v of coordinates (R, T, 2), shape (R, 2, 2), mm; by kernels."""
+    from dmpcli.surfaces.kernels import inverse
+
+    return inverse.extents(at)
 
 
 def _settled(charts: MeshCharts, at: Floats, foot: Floats, facet: Floats) -> Booleans:
@@ -163,51 +288,98 @@ def _settled(charts: MeshCharts, at: Floats, foot: Floats, facet: Floats) -> Boo
             at[rows], still[some] = strip.moved(foot[rows], facet[rows], rough=number == 0)
         change = np.abs(at[left] - before).max(axis=(1, 2))
         sane = np.isfinite(change) & (np.abs(at[left]).max(axis=(1, 2)) < _FAR)
-        done = still & (change < _SAME_NODES)
+        done = still & (change < _SAME_NODES[number == _PASSES - 1])
         good[left[done]] = True
         left = left[~done & sane]
     return good
 
 
 def _strips(
-    charts: MeshCharts, at: Floats, along: bool = False
+    charts: MeshCharts,
+    at: Floats,
+    reach: Floats | None = None,
+    lines: CentreLines | None = None,
+    beside: float | None = None,
+    along: bool = False,
 ) -> Iterator[tuple[Integers, "_Strip"]]:
     """Strips as `strip_chart.lift` walks them for coordinates (R, T, 2), those of a shape together.
 
-    With `along` they have all nodes from the least u to the largest.
+    They are as wide as these swing, or as far as they `reach`, see `_extent`. Their nodes are
+    those of the cells about the coordinates' own, or of cells no farther than so many nodes
+    `beside` these; with `along`, all from the least u to the largest.
     """
-    u, v = at[..., 0], at[..., 1]
-    width = np.maximum(np.abs(v).max(axis=1), strip_chart.LEAST_WIDTH)[:, None]
-    cross_step = width / np.ceil(width / strip_chart.STEP - 1e-6)
-    shapes = strip_chart.grids(u / charts.centre.step, v / cross_step)
-    kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
-    for number, shape in enumerate(kinds):
-        members = np.flatnonzero(kind.reshape(-1) == number)
-        for first in range(0, len(members), strip_chart.PAIRS_AT_ONCE):
-            some = members[first : first + strip_chart.PAIRS_AT_ONCE]
-            grid = Grid(*shape.tolist())
-            yield some, _Strip(charts.rows(some), grid, cross_step[some], at[some], along)
+    reach = at if reach is None else reach
+    for some, grid, cross_step in strip_chart.shapes(charts.centre, reach[..., 0], reach[..., 1]):
+        yield (
+            some,
+            _Strip(
+                charts.rows(some),
+                grid,
+                cross_step,
+                at[some],
+                lines and lines.rows(some),
+                beside,
+                along,
+            ),
+        )
 
 
 class _Strip:
     """Strips of one shape, and coordinates (R, T, 2) on them."""
 
     def __init__(
-        self, charts: MeshCharts, grid: Grid, cross_step: Floats, at: Floats, along: bool
+        self,
+        charts: MeshCharts,
+        grid: Grid,
+        cross_step: Floats,
+        at: Floats,
+        lines: CentreLines | None = None,
+        beside: float | None = None,
+        along: bool = False,
     ) -> None:
+        self.compiled = charts.mesh.compiled
+        self.grid, self.cross_step, self.centre = grid, cross_step, charts.centre
         self.at, self.shape = at, (grid.behind + grid.ahead, grid.right + grid.left)
         self.step = np.stack([charts.centre.step[:, 0], cross_step[:, 0]], axis=1)[:, None]
         self.zero = np.array([grid.behind, grid.right])
         cells = np.zeros((len(at), *self.shape), dtype=bool)
-        pair = np.arange(len(at))[:, None]
-        i, j, _, _ = self._where(at, self.step)
-        cells[pair, i, j] = True
-        # A step may lead into the next cell.
-        node = corners(cells)
-        cells = node[:, 1:, 1:] | node[:, 1:, :-1] | node[:, :-1, 1:] | node[:, :-1, :-1]
+        if self.compiled:
+            self._mark(cells, at, beside or 0.0)
+        else:
+            pair = np.arange(len(at))[:, None]
+            i, j, _, _ = self._where(at, self.step)
+            cells[pair, i, j] = True
+        if beside is None:
+            # A step may lead into the next cell.
+            node = corners(cells)
+            cells = node[:, 1:, 1:] | node[:, 1:, :-1] | node[:, :-1, 1:] | node[:, :-1, :-1]
         if along:
             cells[:] = True
-        self.nodes: Nodes = walk_nodes(charts.mesh, charts.centre, grid, cross_step, cells)
+        self.cells = cells
+        self.nodes: Nodes = walk_nodes(charts.mesh, charts.centre, grid, cross_step, cells, lines)
+
+    def _mark(self, cells: Booleans, at: Floats, beside: float) -> None:
+        """Mark the cells of coordinates, and of places so many nodes beside them."""
+        from dmpcli.surfaces.kernels import inverse
+
+        zero = self.zero.astype(float)
+        inverse.mark(cells, np.ascontiguousarray(at), self.step[:, 0].copy(), zero, beside)
+
+    def covers(self, at: Floats) -> Booleans:
+        """Tell which strokes (R, T, 2) lie on nodes that were walked, shape (R,)."""
+        cells = np.zeros_like(self.cells)
+        self._mark(cells, at, 0.0)
+        return np.asarray(~(cells & ~self.cells).any(axis=(1, 2)))
+
+    def same(self, extent: Floats, reach: Floats, same_width: float) -> Booleans:
+        """Tell which strokes would have the same nodes walked for them again, shape (R,)."""
+        near = np.abs(_width(extent) - _width(reach)) < same_width
+        grid = strip_chart.grids_of(self.centre, extent[..., 0], extent[..., 1])[0]
+        return np.asarray((grid == dataclasses.astuple(self.grid)).all(axis=1) & near)
+
+    def walked(self, rows: Integers, kept: Integers) -> WalkedStrips:
+        """Return some of the strips, which are those of `rows`, with their nodes."""
+        return WalkedStrips(rows, self.grid, self.cross_step[kept], self.nodes.rows(kept))
 
     def _where(self, at: Floats, step: Floats) -> tuple[Integers, Integers, Floats, Floats]:
         """Cells (R, T) of coordinates along u and v, and the shares within them."""
@@ -221,11 +393,24 @@ class _Strip:
 
         `rough` ones need not be: their nodes will be others.
         """
+        if self.compiled:
+            return self._moved_by_kernels(foot, facet, rough)
         at, still = self.at.copy(), np.zeros(len(self.at), dtype=bool)
         size = max(1, strip_chart.SAMPLES_AT_ONCE // at.shape[1])
         for first in range(0, len(at), size):
             rows = np.arange(first, min(first + size, len(at)))
             still[rows] = self._move(at, rows, foot[rows], facet[rows], _ROUGH if rough else _STILL)
+        return at, still
+
+    def _moved_by_kernels(
+        self, foot: Floats, facet: Floats, seeded: bool
+    ) -> tuple[Floats, Booleans]:
+        from dmpcli.surfaces.kernels import inverse
+
+        at, step = self.at.copy(), self.step[:, 0].copy()
+        limits = inverse.StepLimits(_STEPS, _STILL, _LONGEST, _LEAST_AREA)
+        zero = self.zero.astype(float)
+        still = inverse.settle(self.nodes.values, step, zero, at, foot, facet, limits, seeded)
         return at, still
 
     def _move(
