@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from dmpcli import extras
-from dmpcli.surfaces import strip_inverse
+from dmpcli.surfaces import strip_inverse, strip_pieces
 from dmpcli.surfaces.inverse_chart import _by_steps, invert, on_strips
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.strip_grid import Grid
@@ -109,11 +109,11 @@ def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facet
 
 def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkeypatch):
     walked = []
-    monkeypatch.setattr(strip_inverse, "walk_nodes", lambda *given: walked.append(given[4]))
+    monkeypatch.setattr(strip_pieces, "walk_nodes", lambda *given: walked.append(given[4]))
     mesh = SimpleNamespace(compiled=False)
     charts = SimpleNamespace(mesh=mesh, centre=SimpleNamespace(step=np.ones((1, 1))))
     at = np.array([[[0.5, 1.5]]])  # in the cell 3 along and 4 across
-    strip_inverse._Strip(charts, Grid(3, 4, 3, 4), np.ones((1, 1)), at)
+    strip_pieces.Strip(charts, Grid(3, 4, 3, 4), np.ones((1, 1)), at)
     wanted = np.zeros((1, 7, 7), dtype=bool)
     wanted[0, 2:5, 3:6] = True
     np.testing.assert_array_equal(walked[0], wanted)
