@@ -17,6 +17,7 @@
 #   make peers       the same beside other packages, in an environment of their own
 #   make judges      the tests that programs of others judge, which make test does without
 #   make pages       a report's pages in a headless browser: photographs in out/pages
+#   make properties  what must hold for any input, on 1000 inputs of chance each (EXAMPLES=N)
 #   make faults      10,000 seeded faults in simulated time: what must hold whatever fails
 #   make soak        200 recordings killed at random: what is lost
 #   make mutations   damaged and crafted inputs for every reader: what is not refused (MUTATIONS=N)
@@ -47,7 +48,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .PHONY: help setup docs reference demo reproduce reproduce-force test test-quick coverage test-lowest lint lock dist bench peers \
-    judges pages faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
+    judges pages properties faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -136,6 +137,7 @@ bench: $(VENV)/installed
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python -m benchmarks.human_strokes
 	$(BIN)/python -m benchmarks.noise
+	$(BIN)/python -m benchmarks.noise_bounds
 	$(BIN)/python -m benchmarks.alignment
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python -m benchmarks.csv_reading
@@ -183,6 +185,12 @@ pages: $(VENV)/installed
 	    -o $(PAGES)/curved --view -q > $(PAGES)/curved.txt
 	$(DMPCLI) report $(PAGES)/demonstration.parquet $(PAGES)/batch -o $(PAGES)/many --view -q > $(PAGES)/many.txt
 	$(BIN)/python tools/pages.py $(PAGES) $(foreach p,run curved many,$(PAGES)/$(p)/report.html $(PAGES)/$(p)/view.html)
+
+# The tests do with 30 each. Where a test says how many itself, it is that many here too.
+EXAMPLES ?= 1000
+
+properties: $(VENV)/installed
+	DMPCLI_EXAMPLES=$(EXAMPLES) $(PYTEST) $(WHOLE) -m hypothesis
 
 # One seed replays one failure: python -m tests.faults --seed N.
 SEEDS ?= 10000

@@ -1,13 +1,19 @@
 """What `report` costs over a batch. ``python -m benchmarks.reports FOLDER [PLANE [MESH]]``.
 
-Batches of so many strokes (20,000 on a plane, 2,000 on 50,000 faces) and of a fifth of them are
-reported with two processes, in turn: what a stroke takes is the difference between both, so that
-reading the demonstration and drawing the figures is not in it. Processor time of all processes, and
-the largest memory of all of them (proportional set sizes).
+Batches of so many strokes (20,000 on a plane, 1,000 on 50,000 faces) are reported, and such of a
+fifth of them, by kernels and by numpy in turn. Three things are told apart, in processor time:
+measuring alone, in one process, the best of three turns (reading the parts, figures of the strokes,
+lines of the CSV files); the whole command with two processes, of which what a stroke adds is the
+difference between both sizes; and what is left of that without any stroke: starting, loading,
+reading the demonstration and the mesh, drawing the figures and the page. With it the largest memory
+of all processes (proportional set sizes). Nothing is extrapolated. Some minutes.
 """
 
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,62 +23,128 @@ from benchmarks.batches import PLANE, command, curved_pairs, level_pairs, table_
 from benchmarks.cluster_demo import BIN
 from benchmarks.parts import measured
 from benchmarks.surfaces import FACES
+from dmpcli.batch import memory
+from dmpcli.records import dataset, file_io
+from dmpcli.records.storage import located
+from dmpcli.reporting.batch import Measurement
+from dmpcli.reporting.measurement_context import MeasurementContext
+from dmpcli.reporting.recorded import Recorded
+from dmpcli.reporting.report_surface import ReportSurface
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.plane import Plane
+from dmpcli.workflows import recording, surface_input
 from tests.surfaces import cases, fields
 
 REFERENCE = Path("sample_runs/reference.parquet")
-TURNS = 3
+TURNS, FEWER = 3, 5
+MEANS = ("pure", "compiled")
 
 
 def batches(place: Path, plane: int, mesh: int) -> None:
     """Draw the batches, once."""
     subprocess.run([BIN / "dmpcli", "fit", REFERENCE, "-o", place / "skill.json", "-q"], check=True)
     (place / "plane.json").write_text(PLANE)
-    V, F = fields.square(cases.FIELDS["bumpy"], FACES[1], reach=200.0)
-    trimesh.Trimesh(V, F, process=False).export(place / "bumpy.ply")
+    if not (place / "bumpy.ply").exists():
+        V, F = fields.square(cases.FIELDS["bumpy"], FACES[1], reach=200.0)
+        trimesh.Trimesh(V, F, process=False).export(place / "bumpy.ply")
     on_mesh = ("--surface", place / "bumpy.ply", "--snap-tol", 1, "--on-error", "skip")
-    for count in (plane // 5, plane):
+    for count in (plane // FEWER, plane):
         folder = place / f"plane-{count}"
         if not folder.exists():
             table = table_of(place, level_pairs(count), f"level-{count}")
             subprocess.run(command(place, table, folder, "--jobs", 2), check=True)
-    for count in (mesh // 5, mesh):
+    for count in (mesh // FEWER, mesh):
         folder = place / f"mesh-{count}"
         if not folder.exists():
             table = table_of(place, curved_pairs(count), f"curved-{count}")
-            part = ("--pairs-per-part", max(1, mesh // 10))
+            part = ("--pairs-per-part", max(1, count // 2), "--kernels", "compiled")
             subprocess.run(command(place, table, folder, "--jobs", 2, *part, *on_mesh), check=True)
 
 
+def context(surface: Path | None) -> MeasurementContext:
+    """Return what a report of the reference and a surface measures against."""
+    seen = recording.whole(file_io.read(str(REFERENCE)), None, wrench=True)
+    recorded = Recorded(seen.stroke, "reference", str(REFERENCE), "0" * 64, None)
+    reference = recorded.stroke(None)
+    if surface is None:
+        return MeasurementContext(reference)
+    found = surface_input.read(located(str(surface)), None, None).surface
+    V, F = (found.V, found.F) if isinstance(found, Mesh) else (None, None)
+    normal = found.normal if isinstance(found, Plane) else None
+    return MeasurementContext(reference, ReportSurface(surface.name, found, V, F), normal)
+
+
+def alone(sight: MeasurementContext, folder: Path) -> Callable[[], float]:
+    """Return what measures a batch in this process on one thread, and tells ms a stroke."""
+    batch, _ = dataset.read(located(str(folder)))
+    how, none = Measurement(folder.name, sight, told=True), np.empty(0, dtype=np.int64)
+
+    def run() -> float:
+        begin = time.process_time()
+        for part, rows in enumerate(batch.rows_of_parts()):
+            how.part(dataset.part_of(batch, part, rows), none)
+        return 1e3 * (time.process_time() - begin) / len(batch)
+
+    run()  # what is compiled, or kept of the mesh, is there then
+    return run
+
+
+def measuring(kinds: dict[str, tuple[str, int, Path | None]], place: Path) -> None:
+    """Print what measuring alone takes."""
+    memory.keep()
+    print("| measuring alone, one process | numpy, ms | kernels, ms | strokes a second |")
+    print("| --- | ---: | ---: | ---: |")
+    for name, (kind, count, surface) in kinds.items():
+        sight = context(surface)
+        runs = {
+            means: alone(replace(sight, compiled=means == "compiled"), place / f"{kind}-{count}")
+            for means in MEANS
+        }
+        took: dict[str, list[float]] = {means: [] for means in MEANS}
+        for _ in range(TURNS):
+            for means in MEANS:
+                took[means].append(runs[means]())
+        pure, compiled = (min(took[means]) for means in MEANS)
+        print(
+            f"| {count} {name} | {pure:.3f} | {compiled:.3f} | {1e3 / compiled:.0f} |", flush=True
+        )
+
+
+def commands(kinds: dict[str, tuple[str, int, Path | None]], place: Path) -> None:
+    """Print what the whole command takes, with two processes."""
+    print("| whole command, `--jobs 2` | by | ms a stroke | without a stroke, s | MiB at most |")
+    print("| --- | --- | ---: | ---: | ---: |")
+    for name, (kind, count, surface) in kinds.items():
+        for means in MEANS:
+            spent, largest = [], 0.0
+            for size in (count // FEWER, count):
+                words = [BIN / "dmpcli", "report", REFERENCE, place / f"{kind}-{size}"]
+                words += ["-o", place / "report", "--jobs", 2, "-q", "--kernels", means]
+                words += [] if surface is None else ["--surface", surface]
+                _, processor, most = measured([str(word) for word in words])
+                spent.append(processor)
+                largest = max(largest, most)
+            each = (spent[1] - spent[0]) / (count - count // FEWER)
+            rest = spent[1] - each * count
+            row = f"{count} {name} | {means} | {1e3 * each:.3f} | {rest:.1f} | {largest:.0f}"
+            print(f"| {row} |", flush=True)
+
+
 def main() -> None:
-    """Print a Markdown table."""
+    """Print two Markdown tables."""
     place = Path(sys.argv[1])
-    plane, mesh = (int(word) for word in [*sys.argv[2:], "20000", "2000"][:2])
+    asked = [int(word) for word in sys.argv[2:4]]
+    plane, mesh = asked + [20_000, 1_000][len(asked) :]
     place.mkdir(parents=True, exist_ok=True)
     batches(place, plane, mesh)
-    kinds: dict[str, tuple[str, int, list[str]]] = {
-        "plane": ("plane", plane, []),
-        "plane, `--surface plane.json`": ("plane", plane, ["--surface", str(place / "plane.json")]),
-        "50,000 faces, `--surface`": ("mesh", mesh, ["--surface", str(place / "bumpy.ply")]),
+    kinds: dict[str, tuple[str, int, Path | None]] = {
+        "plane": ("plane", plane, None),
+        "plane, `--surface plane.json`": ("plane", plane, place / "plane.json"),
+        "50,000 faces, `--surface`": ("mesh", mesh, place / "bumpy.ply"),
     }
-    took: dict[str, list[list[float]]] = {name: [] for name in kinds}
-    largest = dict.fromkeys(kinds, 0.0)
-    for _ in range(TURNS):
-        for name, (kind, count, more) in kinds.items():
-            walls, spent = [], []
-            for size in (count // 5, count):
-                words = [BIN / "dmpcli", "report", REFERENCE, place / f"{kind}-{size}"]
-                words += ["-o", place / "report", "--jobs", "2", "-q", *more]
-                wall, processor, memory = measured([str(word) for word in words])
-                walls.append(wall)
-                spent.append(processor)
-                largest[name] = max(largest[name], memory)
-            each = (count - count // 5) / np.array([np.diff(spent)[0], np.diff(walls)[0]])
-            took[name].append(each.tolist())
-    print("| strokes, two processes | a second of processor | a second | MiB at most |")
-    print("| --- | ---: | ---: | ---: |")
-    for name, (_, count, _) in kinds.items():
-        processor, wall = np.median(took[name], axis=0)
-        print(f"| {count} {name} | {processor:.0f} | {wall:.0f} | {largest[name]:.0f} |")
+    measuring(kinds, place)
+    print()
+    commands(kinds, place)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import functools
 import gc
+import os
 import signal
 import sys
 
@@ -11,8 +12,15 @@ from hypothesis import settings
 
 from dmpcli.messages import LOG
 
-# The machine may be busy: no test of ours asserts a time, and neither shall hypothesis.
-settings.register_profile("dmpcli", deadline=None, derandomize=True, print_blob=True)
+# The machine may be busy: no test of ours asserts a time, and neither shall hypothesis. Of examples
+# of chance a few stand for many, which make properties tries.
+settings.register_profile(
+    "dmpcli",
+    deadline=None,
+    derandomize=True,
+    print_blob=True,
+    max_examples=int(os.environ.get("DMPCLI_EXAMPLES", "30")),
+)
 settings.load_profile("dmpcli")
 
 FIRST = tuple(

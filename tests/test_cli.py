@@ -46,6 +46,16 @@ def test_generalize_and_execute_load_no_scipy_and_no_pandas(tmp_path):
         assert not {"scipy", "pandas", "matplotlib"} & loaded
 
 
+@pytest.mark.slow
+def test_a_report_without_figures_loads_nothing_that_draws():
+    reference = str(ROOT / "sample_runs" / "reference.parquet")
+    words = ["report", reference, "--json"]
+    loaded = loaded_by(
+        f"from dmpcli import cli\ncli.app({words!r}, standalone_mode=False)\nprint()"
+    )
+    assert not {"matplotlib", "pandas"} & loaded
+
+
 def test_version_is_the_packages():
     done = CliRunner().invoke(cli.app, ["--version"])
     assert done.stdout.strip() == f"dmpcli {dmpcli.__version__}"

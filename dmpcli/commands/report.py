@@ -108,7 +108,7 @@ def command(
         grounds = SiteGrounds(pairs_at, otherwise, surface_cache)
     elif surface_at is not None:
         read = surface_input.read(surface_at, surface_pose, surface_unit)
-    made = report(files, None, layout, read, target, grounds, paper, view, png, wanted.jobs)
+    made = report(files, None, layout, read, target, grounds, paper, view, png, wanted)
     file_io.say(made.json() if as_json else made.text(_width()).encode())
     if show and isinstance(target, Path):
         typer.launch(str((target / ("view.html" if view else "report.html")).resolve()))

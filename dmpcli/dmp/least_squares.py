@@ -97,7 +97,7 @@ class Design:
             if self.uniform:
                 yield part, *_uniform_basis(u, self.intervals)
             else:
-                yield part, *_basis(u, self.knots)
+                yield part, *local_basis(u, self.knots)
 
     def right(self, x: Floats) -> Floats:
         """Return Aᵀ x, shape (K + 5, D), of samples (n, D)."""
@@ -181,7 +181,7 @@ def _runs(interval: Integers) -> tuple[Integers, Integers]:
     return interval[starts], starts
 
 
-def _basis(u: Floats, knots: Floats) -> tuple[Integers, Floats]:
+def local_basis(u: Floats, knots: Floats) -> tuple[Integers, Floats]:
     """Intervals of places u (n,) and the six basis functions that live on them, shape (6, n)."""
     last = len(knots) - 2 * DEGREE - 2
     at = np.clip(np.searchsorted(knots, u, side="right") - 1, DEGREE, last + DEGREE)
@@ -200,7 +200,7 @@ def _basis(u: Floats, knots: Floats) -> tuple[Integers, Floats]:
 
 
 def _uniform_basis(u: Floats, intervals: int) -> tuple[Integers, Floats]:
-    """`_basis` on knots 0, 1 … K, several times faster: by the pieces' polynomials."""
+    """`local_basis` on knots 0, 1 … K, several times faster: by the pieces' polynomials."""
     interval = np.minimum(u.astype(np.int64), intervals - 1)
     powers = np.empty((DEGREE + 1, len(u)))
     powers[0] = 1.0
@@ -225,7 +225,7 @@ def _pieces(intervals: int) -> Floats:
     """Polynomials about the middle of each of K uniform intervals, shape (K, 6, 6)."""
     nodes = 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     places = (np.arange(intervals)[:, None] + 0.5 + nodes).ravel()
-    _, basis = _basis(places, np.pad(np.arange(intervals + 1.0), DEGREE, mode="edge"))
+    _, basis = local_basis(places, np.pad(np.arange(intervals + 1.0), DEGREE, mode="edge"))
     values = basis.reshape(DEGREE + 1, intervals, DEGREE + 1).transpose(1, 0, 2)
     inverse = np.linalg.inv(np.vander(nodes, increasing=True).T)
     pieces: Floats = values @ inverse

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
-from dmpcli.dmp import least_squares
+from dmpcli.arrays import Floats
+from dmpcli.dmp import knot_refinement, least_squares
 from dmpcli.dmp.flat_directions import moving_axes
+from dmpcli.dmp.knot_refinement import ROUNDING
 from dmpcli.dmp.least_squares import DEGREE, Design
 from dmpcli.dmp.noise import FEWEST, Noise
-from dmpcli.dmp.spline_ends import end, with_ends
+from dmpcli.dmp.spline_ends import MANY, end, with_ends
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -29,8 +30,6 @@ _RISEN = 3
 # What a coefficient costs, in variances. Mallows' 2 is unbiased, but the least of many values is
 # not: now and then it is far too soft.
 _PENALTY = 3.0
-# Intervals up to which the ends are a part of the choice of K.
-_ENDS_MATTER = 40
 # Standard errors, ∝ 1/√n, by which the variance may have been estimated too low.
 _UNSURE = 4.0
 # Samples per interval that the search for K needs; more are averaged.
@@ -39,21 +38,10 @@ _DENSE = 12
 _SIGNIFICANT = 1.0
 # Residuals count up to so many σ in the search: corners are for the halving.
 _CLIP = 3.0
-# Sliding means of the residual that noise must explain.
-_WINDOWS = (1, 2, 8, 32, 128, 512)
-# Part of the places found that may be noise (Y. Benjamini and Y. Hochberg, J. R. Statist. Soc. B
-# 57, 1995): so often are intervals halved of which none should be; and where some were.
-_FALSE_FIRST, _FALSE = 0.005, 0.1
-# Times that intervals are halved, and samples that the smallest holds, and the smallest at an end:
-# a spline that is told so little from one side swings beyond its last sample.
-_HALVINGS = 12
-_SMALLEST, _SMALLEST_AT_END = 1.0, 2.0
 # Part of the stroke's acceleration below which that of noise is not worth smoothing.
 _NEGLIGIBLE = 1e-3
 # Points of the shape-preserving curve for each sample.
 _SHAPED = 4
-# Noise below this part of the largest value is rounding.
-_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -146,10 +134,10 @@ def smooth(
     c = design.coefficients(moving)
     rests = (False, False)
     if cutoff is None:
-        halved = _halved(design, c, moving, inside)
-        if halved is None:
+        refined = knot_refinement.refined(design, c, moving, inside, variance)
+        if refined is None:
             return _interpolating(x, duration, noise, resampled)
-        design, c = halved
+        design, c = refined
         c, rests = with_ends(design, c, variance)
     c = c @ axes.T
     residual = centred - design.values(c)
@@ -196,7 +184,7 @@ def _too_little(x: Floats, noise: Noise) -> bool:
 
 def _variance(x: Floats, noise: Noise) -> float:
     """Variance of the noise over all axes, at least that of rounding."""
-    return float(max(noise.total, x.shape[1] * (_ROUNDING * np.max(np.abs(x))) ** 2))
+    return float(max(noise.total, x.shape[1] * (ROUNDING * np.max(np.abs(x))) ** 2))
 
 
 def _intervals(x: Floats, variance: float) -> int | None:
@@ -267,7 +255,7 @@ def _criterion(coarse: Floats, count: int, K: int, share: float) -> float:
     left = np.einsum("td,td->t", residual, residual)
     criterion = float(np.sum(np.minimum(left, _CLIP**2 * share)))
     coefficients = float(design.size)
-    if K <= _ENDS_MATTER:
+    if K <= MANY:
         for reverse in (False, True):
             found = end(design, c, share, reverse)
             criterion += found.cost
@@ -285,59 +273,3 @@ def _squares(coarse: Floats, count: int, K: int) -> Floats:
 def _design(coarse: Floats, count: int, K: int) -> Design:
     each, unit = count // len(coarse), K / (count - 1)
     return least_squares.uniform(len(coarse), K, 0.5 * (each - 1) * unit, each * unit)
-
-
-def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design, Floats] | None:
-    """Halve intervals where noise does not explain the residual; None where that is everywhere."""
-    for i in range(_HALVINGS):
-        doubted = _doubted(x - design.values(c), design, noise, x, i == 0)
-        if not doubted.any():
-            break
-        breaks = design.breaks
-        place = design.first + design.step * np.flatnonzero(doubted)
-        at = np.minimum(np.searchsorted(breaks, place, side="right") - 1, design.intervals - 1)
-        marked = np.zeros(design.intervals + 2, dtype=bool)
-        marked[at + 1] = True
-        marked = marked[1:-1] | marked[:-2] | marked[2:]
-        smallest = np.full(design.intervals, _SMALLEST)
-        smallest[[0, -1]] = _SMALLEST_AT_END
-        marked &= np.diff(breaks) >= 2.0 * smallest * design.step
-        if not marked.any():
-            break
-        if 2 * (design.intervals + int(marked.sum())) >= design.count:
-            return None
-        middles = 0.5 * (breaks[:-1] + breaks[1:])[marked]
-        breaks = np.insert(breaks, np.flatnonzero(marked) + 1, middles)
-        design = Design(design.count, design.first, design.step, breaks, False)
-        c = design.coefficients(x)
-    return design, c
-
-
-def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats, first: bool) -> Booleans:
-    """Samples in the middle of a sliding mean, or on a peak, that noise does not explain, (n,)."""
-    from scipy.special import chdtrc, chdtri
-
-    count, dimensions = residual.shape
-    sigma = max(noise.largest, _ROUNDING * float(np.max(np.abs(x))))
-    # Rounding to a lattice may hold on for as long as the tool is slow.
-    lattice = 0.0 if noise.step is None else 0.5 * noise.step * np.sqrt(dimensions)
-    sums = np.concatenate([np.zeros((1, dimensions)), np.cumsum(residual, axis=0)])
-    squares = np.zeros((len(_WINDOWS) + 1, count))
-    for row, window in zip(squares, _WINDOWS, strict=False):
-        if window > count or (window > _WINDOWS[3] and window > count / (2 * design.intervals)):
-            break
-        means = (sums[window:] - sums[:-window]) / window
-        far = np.sqrt(np.einsum("td,td->t", means, means)) - lattice
-        row[window // 2 : window // 2 + len(far)] = window * np.maximum(far / sigma, 0.0) ** 2
-    if noise.step is None:
-        # At a corner the residual swings to and fro.
-        peaks = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
-        squares[-1, 1:-1] = np.einsum("td,td->t", peaks, peaks) / (1.5 * sigma**2)
-    # Of the places found so many may be none; where one corner is found there are more.
-    share = _FALSE_FIRST if first else _FALSE
-    candidates = np.sort(squares[squares > chdtri(dimensions, share)])[::-1]
-    false = chdtrc(dimensions, candidates) * squares.size / np.arange(1, len(candidates) + 1)
-    found = np.flatnonzero(false <= share)
-    if len(found) == 0:
-        return np.zeros(count, dtype=bool)
-    return np.asarray(np.any(squares >= candidates[found[-1]], axis=0))

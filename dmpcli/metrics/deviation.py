@@ -4,13 +4,18 @@ Many strokes are compared without a loop over them and without looking at every 
 known of the demonstration's clearance says which ones cannot be the nearest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from dmpcli.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    from dmpcli.metrics.kernels.polyline import Curve
 
 # Pairs of point and segment held at once: temporaries of 256 kB stay in the processor's cache.
 _BLOCK = 32_000
@@ -56,11 +61,14 @@ class Taught:
         Increasing, s; m ≥ 2.
     place : array, shape (m, 3)
         u, v, w from its start, mm.
+    compiled : bool
+        Whether kernels compare strokes with it: the same but for rounding.
     """
 
-    def __init__(self, t: Floats, place: Floats) -> None:
+    def __init__(self, t: Floats, place: Floats, compiled: bool = False) -> None:
         self.phase = (t - t[0]) / (t[-1] - t[0])
         self.place = place
+        self.compiled = compiled
 
     @cached_property
     def _clear(self) -> list[Floats]:
@@ -84,6 +92,8 @@ class Taught:
         """
         phase = (t - t[0]) / (t[-1] - t[0])
         same = np.stack([np.interp(phase, self.phase, column) for column in self.place.T])
+        if self.compiled:
+            return self._walked(same, place, stretch)
         u, v, w = place
         apart = np.sqrt(
             (u - stretch[:, None] * same[0]) ** 2 + (v - same[1]) ** 2 + (w - same[2]) ** 2
@@ -95,6 +105,22 @@ class Taught:
         else:
             nearest = self._nearest(phase, place, stretch)
         return Deviations(_rms(nearest), nearest.max(axis=1), _rms(apart), apart.max(axis=1))
+
+    @cached_property
+    def _curve(self) -> "tuple[Curve, Floats]":
+        """What kernels search, and the clearance of its corners."""
+        from dmpcli.metrics.kernels import polyline
+
+        return polyline.curve(self.place), _clearance(self.place, _REACHES[:1])[0]
+
+    def _walked(self, same: Floats, place: Floats, stretch: Floats) -> Deviations:
+        """Deviations by kernels; `same` are the demonstration's places (3, n) at the phases."""
+        from dmpcli.metrics.kernels import polyline
+
+        curve, clear = self._curve
+        out = np.empty((4, len(stretch)))
+        polyline.deviations(curve, clear, same, np.ascontiguousarray(place), stretch, out)
+        return Deviations(*out)
 
     def _nearest(self, phase: Floats, place: Floats, stretch: Floats) -> Floats:
         """Distances to the stretched demonstration, shape (B, n), mm."""
@@ -258,7 +284,7 @@ def _to_segments(corners: Floats, point: Floats) -> Floats:
     return np.asarray(du)
 
 
-def _clearance(place: Floats) -> list[Floats]:
+def _clearance(place: Floats, reaches: Sequence[int] = _REACHES) -> list[Floats]:
     """Least distance of each corner to the segments beyond each reach along the curve, mm.
 
     A stretch by s along u leaves at least min(1, s) of every distance.
@@ -267,7 +293,7 @@ def _clearance(place: Floats) -> list[Floats]:
     a, b = place[:-1], np.diff(place, axis=0)
     bb = np.einsum("md,md->m", b, b)
     safe = np.where(bb > 0.0, bb, 1.0)
-    clear = [np.empty(m) for _ in _REACHES]
+    clear = [np.empty(m) for _ in reaches]
     rows = max(1, _AT_ONCE // m)
     for first in range(0, m, rows):
         corner = np.arange(first, min(first + rows, m))
@@ -280,7 +306,7 @@ def _clearance(place: Floats) -> list[Floats]:
         before[:, 1:] = np.minimum.accumulate(apart, axis=1)
         after[:, :-1] = np.minimum.accumulate(apart[:, ::-1], axis=1)[:, ::-1]
         row = np.arange(len(corner))
-        for known, reach in zip(clear, _REACHES, strict=True):
+        for known, reach in zip(clear, reaches, strict=True):
             low, high = np.maximum(corner - reach, 0), np.minimum(corner + reach, m - 1)
             known[corner] = np.minimum(before[row, low], after[row, high])
     return clear

@@ -4,11 +4,15 @@ Each figure is that of the stroke alone; no stroke knows of those beside it.
 """
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, length
+
+if TYPE_CHECKING:
+    from dmpcli.metrics.kernels.polyline import Curve
 
 _REACH = 8
 """Samples of the demonstration looked at on either side of the one of the same phase."""
@@ -26,21 +30,33 @@ class TaughtHeights:
         0 to 1, increasing.
     place : array, shape (m, 3)
         u, v, w as drawn, mm; m ≥ 2.
+    compiled : bool
+        Whether kernels look for them: the same but for rounding.
     """
 
-    def __init__(self, phase: Floats, place: Floats) -> None:
-        self.phase, self.place = phase, place
+    def __init__(self, phase: Floats, place: Floats, compiled: bool = False) -> None:
+        self.phase, self.place, self.compiled = phase, place, compiled
 
     @cached_property
     def _clear(self) -> Floats:
-        """Least distance of each sample to those beyond `_REACH`, shape (m,), mm."""
+        return self._clearance(_REACH)
+
+    @cached_property
+    def _curve(self) -> "tuple[Curve, Floats]":
+        """What kernels search, and the clearance of its corners beyond the next ones."""
+        from dmpcli.metrics.kernels import polyline
+
+        return polyline.curve(self.place), self._clearance(1)
+
+    def _clearance(self, reach: int) -> Floats:
+        """Least distance of each sample to those beyond a reach, shape (m,), mm."""
         m = len(self.place)
         clear = np.empty(m)
         rows = max(1, _AT_ONCE // m)
         for first in range(0, m, rows):
             at = np.arange(first, min(first + rows, m))
             apart = np.hypot(*(self.place[at, None, :2] - self.place[:, :2]).transpose(2, 0, 1))
-            apart[np.abs(at[:, None] - np.arange(m)) <= _REACH] = np.inf
+            apart[np.abs(at[:, None] - np.arange(m)) <= reach] = np.inf
             clear[at] = apart.min(axis=1)
         return clear
 
@@ -59,6 +75,12 @@ class TaughtHeights:
         w = self.place[:, 2]
         if np.all(w == w[0]):
             return np.full(uv.shape[1:], w[0])
+        if self.compiled:
+            from dmpcli.metrics.kernels import polyline
+
+            found = np.empty(uv.shape[1:])
+            polyline.heights_there(*self._curve, np.ascontiguousarray(uv), stretch, found)
+            return found
         nearest = self._nearest(phase, uv, stretch)
         u, v = uv
         # Beside the nearest sample on the nearer of its two segments: a lift is steep.

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.sine_series import zero_phase
+from dmpcli.sine_series import lowered, zero_phase
 
 CUTOFF = 10.0
 """Hz: above it a hand's movement holds noise only [3]; the same for files of every rate."""
@@ -48,7 +48,9 @@ class Motions:
     sparc: Floats
 
 
-def motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions:
+def motions(
+    t: Floats, position: Floats, start: Floats, goal: Floats, compiled: bool = False
+) -> Motions:
     """Measure how B strokes move.
 
     Parameters
@@ -59,7 +61,11 @@ def motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions
         mm.
     start, goal : array, shape (B, 3)
         Where each stroke should begin and end, mm.
+    compiled : bool
+        Whether by kernels: the same but for rounding.
     """
+    if compiled:
+        return _by_kernels(t, position, start, goal)
     step = _norm(position[..., 1:] - position[..., :-1])
     dt, even = _even(t, position, CUTOFF)
     return Motions(
@@ -69,6 +75,30 @@ def motions(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions
         np.linalg.norm(position[..., -1].T - goal, axis=1),
         _ldlj(dt, float(t[-1] - t[0]), even),
         _sparc(dt, even, CUTOFF),
+    )
+
+
+def _by_kernels(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions:
+    from dmpcli.metrics.kernels import strokes
+
+    count, n = position.shape[1:]
+    length, peak, jerk, rough = np.empty((4, count))
+    strokes.ways(np.diff(t), position, length, peak)
+    dt, even = _resampled(t, position)
+    waves, speed = np.empty((3, count, n - 2)), np.empty((count, n - 1))
+    strokes.less_line(np.ascontiguousarray(even), waves)
+    ends = even[..., [0, -1]].transpose(2, 0, 1).copy()
+    if _low_passed(dt, CUTOFF):
+        waves = lowered(waves, CUTOFF * dt, ORDER)
+    strokes.smoothness(dt, waves, ends, speed, jerk, rough)
+    first, last = position[..., 0].T, position[..., -1].T
+    return Motions(
+        length,
+        peak,
+        np.linalg.norm(first - start, axis=1),
+        np.linalg.norm(last - goal, axis=1),
+        _ldlj_of(dt, float(t[-1] - t[0]), jerk / dt**6, speed.max(axis=1)),
+        _sparc_of(dt, speed, CUTOFF, rough, folded=True),
     )
 
 
@@ -137,8 +167,13 @@ def _ldlj(dt: float, T: float, p: Floats) -> Floats:
     jerk = bend[..., 1:] - bend[..., :-1]
     squared = np.einsum("cbn,cbn->bn", jerk, jerk) / dt**6
     # Third differences reach to one sample from either end; the end values hold there.
-    integral = dt * (squared.sum(axis=1) + squared[:, 0] + squared[:, -1])
-    peak = step.max(axis=1) / dt
+    whole = squared.sum(axis=1) + squared[:, 0] + squared[:, -1]
+    return _ldlj_of(dt, T, whole, step.max(axis=1) / dt)
+
+
+def _ldlj_of(dt: float, T: float, squared: Floats, peak: Floats) -> Floats:
+    """LDLJ of summed squares of the jerk, those of both ends twice, and largest speeds, (B,)."""
+    integral = dt * squared
     moves = (peak > 0.0) & (integral > 0.0)
     safe = np.where(moves, peak, 1.0)
     ldlj = -np.log(T**3 / safe**2 * np.where(moves, integral, 1.0))
@@ -148,26 +183,72 @@ def _ldlj(dt: float, T: float, p: Floats) -> Floats:
 def _sparc(dt: float, p: Floats, cutoff: float) -> Floats:
     """Spectral arc length of evenly sampled, low-passed positions (d, B, n)."""
     speed = _norm(p[..., 1:] - p[..., :-1]) / dt
+    return _sparc_of(dt, speed, cutoff, _roughness(speed))
+
+
+def _roughness(speed: Floats) -> Floats:
+    """Sums of the magnitudes of second differences of speeds (B, n) among zeros, shape (B,)."""
+    padded = np.pad(speed, ((0, 0), (2, 2)))
+    return np.asarray(np.abs(padded[:, 2:] - 2.0 * padded[:, 1:-1] + padded[:, :-2]).sum(axis=1))
+
+
+def _sparc_of(
+    dt: float, speed: Floats, cutoff: float, rough: Floats, folded: bool = False
+) -> Floats:
+    """Spectral arc length of speeds (B, n); for `rough` see `_loud_at_most`.
+
+    With `folded` half of the products are spared: the same but for rounding.
+    """
     n = speed.shape[1]
     size = 2 ** (int(np.ceil(np.log2(n))) + _PADDING)
     lines = int(np.searchsorted(np.fft.rfftfreq(size, dt), cutoff, side="right"))
     # Speeds are not negative, so that the spectrum is largest at rest.
     largest = speed.sum(axis=1)
-    needed = _loud_at_most(speed, largest, size)
+    needed = _loud_at_most(rough, largest, size)
     result = np.full(len(speed), np.nan)
     few = needed <= _FEW * lines
     rows = np.flatnonzero((largest > 0.0) & few)
     if len(rows):
         count = min(int(needed[rows].max()) + 1, lines)
-        cosine, sine = _waves(n, size, -(-count // 32) * 32)
-        some = speed[rows]
-        spectrum = np.sqrt((some @ cosine) ** 2 + (some @ sine) ** 2)[:, :count]
+        wide, some = -(-count // 32) * 32, speed[rows]
+        if folded:
+            spectrum = _folded(some, size, wide)[:, :count]
+        else:
+            cosine, sine = _waves(n, size, wide)
+            spectrum = np.sqrt((some @ cosine) ** 2 + (some @ sine) ** 2)[:, :count]
         result[rows] = _arc(spectrum / largest[rows, None])
     rows = np.flatnonzero((largest > 0.0) & ~few)
     if len(rows):
         spectrum = np.abs(np.fft.rfft(speed[rows], size))[:, :lines]
         result[rows] = _arc(spectrum / largest[rows, None])
     return result
+
+
+def _folded(speed: Floats, size: int, count: int) -> Floats:
+    """First lines of the spectra of speeds (B, n), counted from their middles, (B, count).
+
+    There cosines go with what a speed has in common with its mirror image, sines with the rest.
+    """
+    n = speed.shape[1]
+    cosine, sine = _half_waves(n, size, count)
+    half = len(cosine)
+    mirrored = speed[:, : n - half - 1 : -1]
+    even, odd = speed[:, :half] + mirrored, speed[:, :half] - mirrored
+    if n % 2:
+        even[:, -1] *= 0.5  # the middle is its own image
+    real, imaginary = even @ cosine, odd @ sine
+    real *= real
+    imaginary *= imaginary
+    real += imaginary
+    return np.asarray(np.sqrt(real, out=real))
+
+
+@lru_cache(maxsize=4)
+def _half_waves(n: int, size: int, count: int) -> tuple[Floats, Floats]:
+    """Cosines and sines of the first lines up to the middle of n samples, (n / 2, count) each."""
+    from_middle = np.arange(n - n // 2) - 0.5 * (n - 1)
+    turn = 2.0 * np.pi / size * np.outer(from_middle, np.arange(count))
+    return np.cos(turn), np.sin(turn)
 
 
 @lru_cache(maxsize=4)
@@ -177,14 +258,12 @@ def _waves(n: int, size: int, count: int) -> tuple[Floats, Floats]:
     return np.cos(turn), np.sin(turn)
 
 
-def _loud_at_most(speed: Floats, largest: Floats, size: int) -> Floats:
+def _loud_at_most(rough: Floats, largest: Floats, size: int) -> Floats:
     """Line of the spectrum beyond which none reaches the threshold, shape (B,).
 
     Summed by parts twice, the line at angle w is at most the sum of the second differences'
-    magnitudes over (2 sin(w/2))².
+    magnitudes, `rough` (B,), over (2 sin(w/2))².
     """
-    padded = np.pad(speed, ((0, 0), (2, 2)))
-    rough = np.abs(padded[:, 2:] - 2.0 * padded[:, 1:-1] + padded[:, :-2]).sum(axis=1)
     safe = np.where(largest > 0.0, largest, 1.0)
     sine = 0.5 * np.sqrt(1.000001 * rough / (_THRESHOLD * safe))
     angle = np.where(sine < 1.0, 2.0 * np.arcsin(np.minimum(sine, 1.0)), np.pi)
@@ -203,6 +282,19 @@ def _arc(spectrum: Floats) -> Floats:
 
 def _even(t: Floats, position: Floats, cutoff: float | None) -> tuple[float, Floats]:
     """Bring samples to even times (as many as given), low-passed without phase shift."""
+    dt, p = _resampled(t, position)
+    if cutoff is None or not _low_passed(dt, cutoff):
+        return dt, p
+    return dt, zero_phase(p, cutoff * dt, ORDER)
+
+
+def _low_passed(dt: float, cutoff: float) -> bool:
+    """Tell whether samples hold what is above a cut-off, Hz."""
+    return 0.45 / dt > cutoff
+
+
+def _resampled(t: Floats, position: Floats) -> tuple[float, Floats]:
+    """Bring samples to even times (as many as given)."""
     n = len(t)
     dt = float(t[-1] - t[0]) / (n - 1)
     even = t[0] + dt * np.arange(n)
@@ -211,9 +303,7 @@ def _even(t: Floats, position: Floats, cutoff: float | None) -> tuple[float, Flo
         i = np.clip(np.searchsorted(t, even, side="right") - 1, 0, n - 2)
         share = np.clip((even - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
         p = p[..., i] + share * (p[..., i + 1] - p[..., i])
-    if cutoff is None or 0.45 / dt <= cutoff:
-        return dt, p
-    return dt, zero_phase(p, cutoff * dt, ORDER)
+    return dt, p
 
 
 def _norm(vectors: Floats) -> Floats:

@@ -16,6 +16,9 @@ LINE = 0.008
 _FEW, _PASSES = 32, 64
 """Corners of a stroke that are simply walked over; how often the small swings are looked for."""
 
+_TURNS = 16
+"""Turning points that there is room for to each stroke, before they are counted."""
+
 
 @dataclass(frozen=True)
 class WaveHeights:
@@ -190,7 +193,11 @@ def lateral(position: Floats, start: Floats, goal: Floats, normal: Floats) -> Fl
 
 
 def many_waves(
-    v: Floats, length: Floats, closed: Booleans, prominence: float = PROMINENCE
+    v: Floats,
+    length: Floats,
+    closed: Booleans,
+    prominence: float = PROMINENCE,
+    compiled: bool = False,
 ) -> ManyWaves:
     """Wave heights of strokes with as many samples each; none for lines and closed strokes.
 
@@ -207,11 +214,16 @@ def many_waves(
     closed : array, shape (B,)
     prominence : float
         Share of v's range, above 0.
+    compiled : bool
+        Whether by kernels: the same.
     """
-    swing = np.ptp(v, axis=1)
-    rows = np.flatnonzero((swing >= LINE * length) & ~closed & (swing > 0.0))
-    stroke, at = _turning_points(v[rows], prominence * swing[rows])
-    stroke = rows[stroke]
+    if compiled:
+        stroke, at = _turning_points_walked(v, length, closed, prominence)
+    else:
+        swing = np.ptp(v, axis=1)
+        rows = np.flatnonzero((swing >= LINE * length) & ~closed & (swing > 0.0))
+        stroke, at = _turning_points(v[rows], prominence * swing[rows])
+        stroke = rows[stroke]
     before, here, after = v[stroke, at - 1], v[stroke, at], v[stroke, at + 1]
     bend = before - 2.0 * here + after
     offset = np.divide(0.5 * (before - after), bend, out=np.zeros(len(at)), where=bend != 0.0)
@@ -255,6 +267,24 @@ def _turning_points(v: Floats, least: Floats) -> tuple[Integers, Integers]:
     strokes, samples = (np.concatenate(list(part)) for part in zip(*found, strict=True))
     order = np.argsort(strokes, kind="stable")
     return strokes[order], samples[order]
+
+
+def _turning_points_walked(
+    v: Floats, length: Floats, closed: Booleans, prominence: float
+) -> tuple[Integers, Integers]:
+    """Find the same by kernels, of the strokes that may have waves."""
+    from dmpcli.metrics.kernels import strokes
+
+    v = np.ascontiguousarray(v)
+    swing = strokes.swings(v)
+    looked = (swing >= LINE * length) & ~closed & (swing > 0.0)
+    room = _TURNS * len(v)
+    while True:
+        stroke, at = np.empty((2, room), dtype=np.int64)
+        held = strokes.turning_points(v, prominence * swing, looked, stroke, at)
+        if held <= room:
+            return stroke[:held], at[:held]
+        room = held
 
 
 def _without_ripple(

@@ -18,8 +18,12 @@ LARGEST = 1e30
 """Numbers beyond this are no quantity in any unit, and their products would overflow."""
 
 
-def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str, AnyArray]:
+def columns_of(
+    table: Any, wanted: Mapping[str, Column], name: str, views: bool = False
+) -> dict[str, AnyArray]:
     """Return the wanted columns of a pyarrow table as arrays, checked.
+
+    With `views` those without nulls are not copied, and cannot be written to.
 
     Raises
     ------
@@ -34,13 +38,13 @@ def columns_of(table: Any, wanted: Mapping[str, Column], name: str) -> dict[str,
                     f"{name}: column {key!r} is missing; it has {', '.join(table.column_names)}"
                 )
             continue
-        columns[key] = _array(table.column(key), key, column, name)
+        columns[key] = _array(table.column(key), key, column, name, views)
     if table.num_rows == 0:
         raise InputError(f"{name}: holds no rows")
     return columns
 
 
-def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
+def _array(chunked: Any, key: str, column: Column, name: str, views: bool) -> AnyArray:
     try:
         values = chunked.cast(TYPES[column.type]).combine_chunks()
     except pa.ArrowException:
@@ -49,6 +53,9 @@ def _array(chunked: Any, key: str, column: Column, name: str) -> AnyArray:
             if column.type != "string"
             else f"{name}: column {key!r} holds {chunked.type}, text is needed"
         ) from None
+    whole = column.type == "double" and values.null_count == 0
+    if whole and all_within(seen := _seen(values), LARGEST):
+        return seen if views else seen.copy()
     unknown = nulls(values)
     if column.required and unknown.any():
         raise InputError(
@@ -120,11 +127,16 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
 
 def numbers(values: Any) -> AnyArray:
     """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
+    return _seen(values).copy()
+
+
+def _seen(values: Any) -> AnyArray:
+    """Numbers of a pyarrow array where they lie."""
     dtype = dtype_of(values.type)
     if len(values) == 0:
         return np.empty(0, dtype=dtype)
     whole = np.frombuffer(values.buffers()[1], dtype=dtype)
-    return whole[values.offset : values.offset + len(values)].copy()
+    return whole[values.offset : values.offset + len(values)]
 
 
 def joined(chunked: Any) -> AnyArray:

@@ -64,9 +64,11 @@ class BatchFolder:
     def __len__(self) -> int:
         return len(self.part)
 
-    def rows_of(self, part: int) -> Integers:
-        """Rows of the pairs that lie in a part, counted among those that have a trajectory."""
-        return np.flatnonzero(self.part == part)
+    def rows_of_parts(self) -> list[Integers]:
+        """Rows of the pairs that lie in each part, counted among those that have a trajectory."""
+        order = np.argsort(self.part, kind="stable")
+        ends = np.searchsorted(self.part[order], np.arange(1, len(self.files)))
+        return np.split(order, ends)
 
 
 @dataclass(frozen=True)
@@ -98,12 +100,13 @@ class Piece:
 
     @cached_property
     def _filled(self) -> set[str]:
-        return {name for name, column in self.columns.items() if not np.isnan(column).all()}
+        columns = self.columns.items()
+        # Mostly the first value tells.
+        return {n for n, c in columns if not np.isnan(c[0]) or not np.isnan(c).all()}
 
 
-def part_of(batch: BatchFolder, part: int) -> BatchFolder:
-    """Return what a batch knows of one part alone, by its place in `BatchFolder.files`."""
-    rows = batch.rows_of(part)
+def part_of(batch: BatchFolder, part: int, rows: Integers) -> BatchFolder:
+    """Return what a batch knows of one part alone, by its place in `files`, and its rows."""
     none = batch.status.slice(0, 0)
 
     def own(values: Floats | None) -> Floats | None:
@@ -331,8 +334,9 @@ def pieces(
     InputError
         A part is damaged, or does not hold the pairs that the table says.
     """
+    rows_of = batch.rows_of_parts()
     for number in range(len(batch.files)) if parts is None else parts:
-        rows = batch.rows_of(number)
+        rows = rows_of[number]
         done = 0
         for piece in _part(batch, batch.files[number], rows, columns):
             done += len(piece.rows)
@@ -368,8 +372,9 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
         except InputError:
             raise InputError(f"{name}: is damaged inside; draw the batch again") from None
         with untrusted.decoding(name, f"row group {group + 1}"):
-            found = columns_of(table, wanted, name)
+            found = columns_of(table, wanted, name, views=True)
             ids, first = _runs(table.column("id"), name)
+        del table
         if waiting is not None:
             before = len(next(iter(carried.values())))
             found = {n: np.concatenate([carried[n], c]) for n, c in found.items()}

@@ -205,6 +205,9 @@ class ReportedFile(JsonPart):
     skill: dict[str, Any] | None
     pose_error: PoseError | None
     provenance: Origin | None
+    kernels: Annotated[
+        Literal["compiled"] | None, Field(description="by what means a large batch was measured")
+    ] = None
 
 
 class PaperTable(JsonPart):

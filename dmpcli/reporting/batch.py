@@ -1,10 +1,11 @@
 """What a report says of a batch: distributions, the worst strokes by name, why pairs failed.
 
-Nothing here grows with the batch but a few numbers per stroke; what every stroke says on its own
-goes into CSV files as it is measured.
+Nothing here grows with the batch: what every stroke says on its own goes into CSV files as it is
+measured, and the figures that are told of all together wait in a file; one is held at a time.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TextIO
 
@@ -15,13 +16,11 @@ from dmpcli.arrays import Floats, Integers
 from dmpcli.messages import Advance
 from dmpcli.metrics import paper_values
 from dmpcli.records.dataset import BatchFolder, facts_of, part_of, states_of
-from dmpcli.reporting.batch_measures import (
-    FIGURES,
-    MeasuredBlock,
-    MeasurementContext,
-    measured_parts,
-)
+from dmpcli.reporting.batch_measures import measured_parts, strokes_of_rows
+from dmpcli.reporting.figure_store import FigureStore
+from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.stroke import ReportedStroke
+from dmpcli.reporting.stroke_block import FIGURES, MeasuredBlock
 from dmpcli.reporting.stroke_measures import Row, distribution
 
 WORST = 5
@@ -69,8 +68,8 @@ class MeasuredBatch:
     batch : BatchFolder
     label : str
     sight : MeasurementContext
-    table : array, shape (B, len(FIGURES))
-        NaN where a figure does not exist.
+    figures : FigureStore
+        Of all strokes; NaN where one does not exist.
     shown : list of ReportedStroke
         An even choice, and what lies at the places of the paper.
     """
@@ -78,12 +77,12 @@ class MeasuredBatch:
     batch: BatchFolder
     label: str
     sight: MeasurementContext
-    table: Floats
+    figures: FigureStore
     shown: list[ReportedStroke] = field(default_factory=list)
 
     def values(self, name: str) -> Floats:
         """Return the values of one figure, shape (B,), NaN where there is none."""
-        return np.asarray(self.table[:, FIGURES.index(name)])
+        return self.figures.column(name)
 
     @property
     def target(self) -> float | None:
@@ -100,15 +99,21 @@ class MeasuredBatch:
             "worst": {name: self.worst(name) for name in RANKED},
             "states": states,
             "failures": failures,
-        }
+        } | ({"kernels": "compiled"} if self.sight.compiled else {})
+
+    @property
+    def table(self) -> Floats:
+        """All figures at once, shape (B, len(FIGURES))."""
+        return np.column_stack([self.values(name) for name in FIGURES])
 
     def worst(self, name: str) -> list[Row]:
         """Return the worst strokes by one figure, the very worst first."""
+        values = self.values(name)
         return [
             {
                 "id": self.batch.ids[row].as_py(),
                 "part": self.batch.files[int(self.batch.part[row])],
-                "value": float(self.values(name)[row]),
+                "value": float(values[row]),
             }
             for row in self.worst_rows(name)
         ]
@@ -130,9 +135,7 @@ class MeasuredBatch:
 
     def strokes(self, rows: Sequence[int]) -> list[ReportedStroke]:
         """Read some strokes once more, as they are drawn."""
-        found: dict[int, ReportedStroke] = {}
-        for some in measured_parts(self.batch, self.label, self.sight, np.array(rows)):
-            found |= {int(row): some.stroke(i) for i, row in enumerate(some.rows)}
+        found = strokes_of_rows(self.batch, self.label, self.sight, np.array(rows))
         return [found[row] for row in rows]
 
 
@@ -200,12 +203,12 @@ class Measurement:
 
     def _kept(self, some: MeasuredBlock, batch: BatchFolder, chosen: Integers) -> MeasuredStrokes:
         drawn = np.flatnonzero(np.isin(some.rows, chosen)).tolist()
-        shown = {int(some.rows[i]): some.stroke(i) for i in drawn}
+        shown = dict(zip(some.rows[drawn].tolist(), some.strokes(drawn), strict=True))
         if not self.told:
             return MeasuredStrokes(some.rows, some.table, shown, "", "")
         ids = batch.ids.take(pa.array(some.rows)).to_pylist()
-        waves = "".join(_wave_rows(some, self.label, ids))
-        strokes = "".join(_stroke_rows(some, self.label, ids, batch))
+        waves = _wave_rows(some, self.label, ids)
+        strokes = _stroke_rows(some, self.label, ids, batch)
         return MeasuredStrokes(some.rows, some.table, shown, waves, strokes)
 
     def apart(self, batch: BatchFolder) -> "Measurement":
@@ -215,7 +218,7 @@ class Measurement:
         """
         sight = self.sight.of_drawn(facts_of(batch))
         if sight.reference is not None:
-            sight = replace(sight, reference=replace(sight.reference, seen_by=None), _others={})
+            sight = replace(sight, reference=replace(sight.reference, seen_by=None))
         return replace(self, sight=sight)
 
 
@@ -254,7 +257,7 @@ def measure(
     InputError
         A part is damaged or not the batch's; by name.
     """
-    many = MeasuredBatch(batch, label, sight, np.full((len(batch), len(FIGURES)), np.nan))
+    many = MeasuredBatch(batch, label, sight, FigureStore(len(batch), FIGURES))
     chosen = _chosen(batch)
     how = Measurement(label, sight, tables is not None)
     if elsewhere is None or len(batch.files) < 2:
@@ -263,7 +266,7 @@ def measure(
         found = _by_parts(batch, chosen, how, elsewhere)
     shown: dict[int, ReportedStroke] = {}
     for some in found:
-        many.table[some.rows] = some.table
+        many.figures.put(some.rows, some.table)
         shown |= some.shown
         if tables is not None:
             tables.waves.write(some.waves)
@@ -278,9 +281,9 @@ def _by_parts(
     batch: BatchFolder, chosen: Integers, how: Measurement, elsewhere: Measure
 ) -> Iterator[MeasuredStrokes]:
     """Measure parts in other processes: each gets its own rows of the table alone."""
-    own = [batch.rows_of(part) for part in range(len(batch.files))]
+    own = batch.rows_of_parts()
     tasks = (
-        (part_of(batch, part), np.flatnonzero(np.isin(rows, chosen)))
+        (part_of(batch, part, rows), np.flatnonzero(np.isin(rows, chosen)))
         for part, rows in enumerate(own)
     )
     for rows, found in zip(own, elsewhere(how.apart(batch), batch, tasks), strict=True):
@@ -322,7 +325,7 @@ def histogram(
     return {"edges": edges.tolist(), "counts": counts.tolist()}
 
 
-def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> Iterable[str]:
+def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> str:
     """Every wave height, as in `document.write_waves`."""
     waves = some.waves
     ends = waves.ends
@@ -334,23 +337,33 @@ def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> Iterable[
     )
     names = [_cell(f"{label}[{name}]") for name in ids]
     form = ",".join(["%s", some.role, "%d"] + ["%.6f"] * numbers.shape[1]) + "\n"
-    for i, k, row in zip(stroke.tolist(), number.tolist(), numbers.tolist(), strict=True):
-        yield form % (names[i], k, *row)
+    cells = zip(stroke.tolist(), number.tolist(), numbers.tolist(), strict=True)
+    return "".join([form % (names[i], k, *row) for i, k, row in cells])
 
 
-def _stroke_rows(
-    some: MeasuredBlock, label: str, ids: Sequence[str], batch: BatchFolder
-) -> Iterable[str]:
+def _stroke_rows(some: MeasuredBlock, label: str, ids: Sequence[str], batch: BatchFolder) -> str:
     """The figures of every stroke; nothing where there is none."""
-    files = [batch.files[part] for part in batch.part[some.rows].tolist()]
-    form = ",%.6f" * len(FIGURES) + "\n"
-    for name, file, numbers in zip(ids, files, some.table.tolist(), strict=True):
-        figures = (form % tuple(numbers)).replace("nan", "")
-        yield f"{_cell(label)},{_cell(name)},{_cell(file)}{figures}"
+    first = _cell(label)
+    files = [_cell(file) for file in batch.files]
+    part = batch.part[some.rows].tolist()
+    known = np.isfinite(some.table)
+    # Strokes that are measured together mostly have the same figures.
+    forms = {}
+    cells = zip(ids, part, known, some.table.tolist(), strict=True)
+    lines = []
+    for name, file, which, numbers in cells:
+        kind = which.tobytes()
+        if kind not in forms:
+            forms[kind] = "%s,%s,%s" + "".join(",%.6f" if one else ",%.0s" for one in which) + "\n"
+        lines.append(forms[kind] % (first, _cell(name), files[file], *numbers))
+    return "".join(lines)
+
+
+_QUOTED = re.compile('[,"\r\n]')
 
 
 def _cell(text: str) -> str:
     """Return a text as a cell of a CSV file."""
-    if any(sign in text for sign in ',"\r\n'):
+    if _QUOTED.search(text):
         return '"' + text.replace('"', '""') + '"'
     return text

@@ -10,13 +10,14 @@ from matplotlib.figure import Figure
 from dmpcli.arrays import Floats
 from dmpcli.dmp.skill import Skill
 from dmpcli.records.record import Record
-from dmpcli.reporting import batch_figures, drawing, pose_errors, ruling, run_figures
+from dmpcli.reporting import batch_figures, drawing, ruling, run_figures
 from dmpcli.reporting.batch import MeasuredBatch
 from dmpcli.reporting.contact_figure import contact_figure
 from dmpcli.reporting.curve_names import name_of, named, short
 from dmpcli.reporting.drawing import PlottedCurve, curve_of
 from dmpcli.reporting.part_figure import PlacedCurve, part_figure
 from dmpcli.reporting.plane_figure import Beyond, plane_figure
+from dmpcli.reporting.pose_error_figure import pose_error_figure
 from dmpcli.reporting.pose_errors import Compared
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.spread_curves import spread_curves
@@ -123,7 +124,7 @@ def gallery(shown: Shown) -> list[ReportFigure]:
                     _numbered("pose_error", number),
                     f"Pose error of {short(pair.name)} against {short(pair.against)}",
                     text,
-                    pose_errors.figure(pair),
+                    pose_error_figure(pair),
                 )
             )
         several = [(name, skill) for name, skill in shown.skills if skill.spread is not None]

@@ -1,7 +1,7 @@
-"""The options of ``report`` that are numbers."""
+"""The options of ``report`` that are no files."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
@@ -13,3 +13,7 @@ class ReportOptions(Settings):
     """How large batches are measured."""
 
     jobs: Annotated[int, Ge(1), Le(1024), Option("Processes that measure large batches.")] = 1
+    kernels: Annotated[
+        Literal["auto", "compiled", "pure"],
+        Option("Measure by compiled kernels, or numpy; auto: large batches, if they are here."),
+    ] = "auto"

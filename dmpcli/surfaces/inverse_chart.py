@@ -5,7 +5,7 @@ gives the position back. On a mesh that normal turns smoothly over the facets: 5
 field the closest point of the mesh lies up to 0.16 mm beside the foot.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -101,6 +101,9 @@ def invert(charts: Charts, position: Floats) -> Inverse:
     if isinstance(charts, PlaneCharts):
         return _flat(charts, position)
     shape = position.shape[:2]
+    rows = np.flatnonzero(charts.status == Status.DRAWN)
+    if len(rows) == len(position) > 0 and shape[1]:
+        return _curved(charts, position)
     result = Inverse(
         np.full((*shape, 3), np.nan),
         np.full((*shape, 3, 3), np.nan),
@@ -108,13 +111,45 @@ def invert(charts: Charts, position: Floats) -> Inverse:
         np.full(shape, np.nan),
         charts.status.copy(),
     )
-    rows = np.flatnonzero(charts.status == Status.DRAWN)
     if len(rows) and shape[1]:
         part = _curved(charts.rows(rows), position[rows])
         result.coordinates[rows], result.axes[rows] = part.coordinates, part.axes
         result.reached[rows], result.miss[rows] = part.reached, part.miss
         result.status[rows] = part.status
     return result
+
+
+def on_strips(charts: MeshCharts, position: Floats) -> Inverse:
+    """Find coordinates as `invert` does, of the strokes that are found on strips alone."""
+    shape = position.shape[:2]
+    rows = np.flatnonzero(charts.status == Status.DRAWN)
+    if len(rows) == 0 or shape[1] == 0:
+        return _of_strips(_nothing(shape[1]), shape)
+    every = len(rows) == len(position)
+    whole = _whole(charts if every else charts.rows(rows), position[rows])
+    if len(whole.rows) == len(position):
+        return _all_of_strips(whole)
+    return _of_strips(replace(whole, rows=rows[whole.rows]), shape)
+
+
+def _whole(charts: MeshCharts, given: Floats) -> strip_inverse.Found:
+    """Strokes that are found on strips, and stay on one turn about the part."""
+    whole = strip_inverse.found(charts, given)
+    return whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
+
+
+def _nothing(samples: int) -> strip_inverse.Found:
+    none = np.empty(0, dtype=np.int64)
+    shape = 0, samples
+    return strip_inverse.Found(
+        none, np.empty((*shape, 3)), np.empty((*shape, 3, 3)), np.empty(shape)
+    )
+
+
+def _all_of_strips(whole: strip_inverse.Found) -> Inverse:
+    every = np.ones(whole.miss.shape, dtype=bool)
+    status = np.full(len(every), np.int64(Status.DRAWN))
+    return Inverse(whole.coordinates, whole.axes, every, whole.miss, status)
 
 
 def _flat(charts: PlaneCharts, position: Floats) -> Inverse:
@@ -133,8 +168,9 @@ def _flat(charts: PlaneCharts, position: Floats) -> Inverse:
 def _curved(charts: Charts, given: Floats) -> Inverse:
     if not isinstance(charts, MeshCharts):
         return _by_steps(charts, given)
-    whole = strip_inverse.found(charts, given)
-    whole = whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
+    whole = _whole(charts, given)
+    if len(whole.rows) == len(given):
+        return _all_of_strips(whole)
     rest = np.setdiff1d(np.arange(len(given)), whole.rows)
     result = _of_strips(whole, given.shape[:2])
     if len(rest):

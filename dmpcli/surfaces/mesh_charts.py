@@ -1,5 +1,6 @@
 """Charts of a mesh: which geodesic each pair gets, and which way its strokes are carried."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -95,8 +96,15 @@ class MeshCharts:
         )
         return ~beside.reshape(sideways.shape)
 
-    def lift(self, coordinates: Floats) -> ChartImage:
-        """Carry chart coordinates (B, T, 3), mm, to the mesh; see `ChartImage`."""
+    def lift(
+        self,
+        coordinates: Floats,
+        walked: Sequence[strip_chart.WalkedStrips] | None = None,
+    ) -> ChartImage:
+        """Carry chart coordinates (B, T, 3), mm, to the mesh; see `ChartImage`.
+
+        Charts that are all smooth may bring their strips with nodes that were `walked` before.
+        """
         shape = coordinates.shape
         foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
         axes = np.broadcast_to(np.eye(3), (*shape[:2], 3, 3)).copy()
@@ -106,7 +114,7 @@ class MeshCharts:
         smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
         if len(smooth):
             u, v = coordinates[smooth, :, 0], coordinates[smooth, :, 1]
-            part = strip_chart.lift(self.mesh, self.centre.rows(smooth), u, v)
+            part = strip_chart.lift(self.mesh, self.centre.rows(smooth), u, v, walked)
             foot[smooth] = part.foot
             e_u = cross(part.across, part.normal)
             axes[smooth] = np.stack([e_u, part.across, part.normal], axis=-1)

@@ -5,6 +5,7 @@ each of its nodes the geodesics at a right angle. Between the nodes position and
 one closest-point query per sample puts the result onto the mesh.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,28 +59,84 @@ class Samples:
     slivers: Booleans
 
 
-def lift(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Samples:
-    """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together."""
+@dataclass(frozen=True)
+class WalkedStrips:
+    """Strips whose nodes were walked before.
+
+    Attributes
+    ----------
+    rows : array of int, shape (R,)
+        Of the pairs.
+    grid : Grid
+    cross_step : array, shape (R, 1)
+        mm.
+    nodes : Nodes
+    """
+
+    rows: Integers
+    grid: Grid
+    cross_step: Floats
+    nodes: Nodes
+
+
+def lift(
+    mesh: TriangleMesh,
+    centre: Centre,
+    u: Floats,
+    v: Floats,
+    walked: Sequence[WalkedStrips] | None = None,
+) -> Samples:
+    """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together.
+
+    With `walked`, which has all pairs, nothing is walked again.
+    """
     B, T = u.shape
     foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
     face, stretch = np.empty((B, T), dtype=np.int64), np.empty((B, T))
     outside = np.empty((B, T), dtype=bool)
     status, sharp, slivers = np.empty(B, dtype=np.int64), *np.empty((2, B), dtype=bool)
-    width = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
-    cross_step = width / np.ceil(width / STEP - 1e-6)
-    shapes = grids(u / centre.step, v / cross_step)
-    kinds, kind = np.unique(shapes, axis=0, return_inverse=True)
+    for some in _alike(mesh, centre, u, v) if walked is None else walked:
+        rows = some.rows
+        part = _lift_alike(mesh, centre.rows(rows), some, u[rows], v[rows])
+        foot[rows], e_v[rows], normal[rows] = part.foot, part.across, part.normal
+        outside[rows], status[rows], sharp[rows] = part.outside, part.status, part.sharp
+        slivers[rows], face[rows], stretch[rows] = part.slivers, part.face, part.stretch
+    return Samples(foot, e_v, normal, face, stretch, outside, status, sharp, slivers)
+
+
+def _alike(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Iterator[WalkedStrips]:
+    """Walk the strips of u, v (B, T), those with grids of one shape together."""
+    for rows, grid, cross_step in shapes(centre, u, v):
+        i = _cell(u[rows] / centre.step[rows] + grid.behind, grid.behind + grid.ahead)
+        j = _cell(v[rows] / cross_step + grid.right, grid.right + grid.left)
+        cells = np.zeros((len(rows), grid.behind + grid.ahead, grid.right + grid.left), dtype=bool)
+        cells[np.arange(len(rows))[:, None], i, j] = True
+        nodes = walk_nodes(mesh, centre.rows(rows), grid, cross_step, cells)
+        yield WalkedStrips(rows, grid, cross_step, nodes)
+
+
+def shapes(centre: Centre, u: Floats, v: Floats) -> Iterator[tuple[Integers, Grid, Floats]]:
+    """Rows of pairs with grids of one shape, that shape, and their steps across (R, 1), mm."""
+    found, cross_step = grids_of(centre, u, v)
+    kinds, kind = np.unique(found, axis=0, return_inverse=True)
     for number, shape in enumerate(kinds):
         members = np.flatnonzero(kind.reshape(-1) == number)
         for first in range(0, len(members), PAIRS_AT_ONCE):
             rows = members[first : first + PAIRS_AT_ONCE]
-            part = _lift_alike(
-                mesh, centre.rows(rows), Grid(*shape.tolist()), cross_step[rows], u[rows], v[rows]
-            )
-            foot[rows], e_v[rows], normal[rows] = part.foot, part.across, part.normal
-            outside[rows], status[rows], sharp[rows] = part.outside, part.status, part.sharp
-            slivers[rows], face[rows], stretch[rows] = part.slivers, part.face, part.stretch
-    return Samples(foot, e_v, normal, face, stretch, outside, status, sharp, slivers)
+            yield rows, Grid(*shape.tolist()), cross_step[rows]
+
+
+def widths(v: Floats) -> Floats:
+    """How far strips reach on either side for coordinates v (B, T), shape (B, 1), mm."""
+    width: Floats = np.maximum(np.abs(v).max(axis=1), LEAST_WIDTH)[:, None]
+    return width
+
+
+def grids_of(centre: Centre, u: Floats, v: Floats) -> tuple[Integers, Floats]:
+    """`Grid` of each pair, shape (B, 4), for coordinates (B, T), mm, and steps across (B, 1)."""
+    width = widths(v)
+    cross_step = width / np.ceil(width / STEP - 1e-6)
+    return grids(u / centre.step, v / cross_step), cross_step
 
 
 def grids(u: Floats, v: Floats) -> Integers:
@@ -97,15 +154,15 @@ def grids(u: Floats, v: Floats) -> Integers:
 
 
 def _lift_alike(
-    mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, u: Floats, v: Floats
+    mesh: TriangleMesh, centre: Centre, strips: WalkedStrips, u: Floats, v: Floats
 ) -> Samples:
+    grid, cross_step, nodes = strips.grid, strips.cross_step, strips.nodes
     along, aside = u / centre.step + grid.behind, v / cross_step + grid.right
     i = _cell(along, grid.behind + grid.ahead)
     j = _cell(aside, grid.right + grid.left)
     pair = np.arange(len(u))[:, None]
     cells = np.zeros((len(u), grid.behind + grid.ahead, grid.right + grid.left), dtype=bool)
     cells[pair, i, j] = True
-    nodes = walk_nodes(mesh, centre, grid, cross_step, cells)
     if mesh.compiled:
         feet = _feet_compiled(mesh, centre, nodes, along, aside)
     else:

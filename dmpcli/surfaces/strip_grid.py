@@ -91,19 +91,95 @@ class Nodes:
     sharp: Booleans
     back: Booleans
 
+    def rows(self, rows: Integers | Booleans) -> "Nodes":
+        """Return the nodes of some of the strips."""
+        return Nodes(
+            self.values[rows],
+            self.normal[rows],
+            self.stretch[rows],
+            self.away[rows],
+            self.sharp[rows],
+            self.back[rows],
+        )
+
+
+@dataclass(frozen=True)
+class CentreLines:
+    """Nodes of the centre lines of B charts, which their strips have in common.
+
+    Attributes
+    ----------
+    position, across, normal : array, shape (B, nu, 3)
+        mm; e_v and n.
+    behind, ahead : array of int, shape (B,)
+        How many there are on either side of the start.
+    zero : int
+        The node at the start.
+    """
+
+    _lines: "_Lines"
+    behind: Integers
+    ahead: Integers
+    zero: int
+
+    @classmethod
+    def walked(
+        cls, mesh: TriangleMesh, centre: Centre, behind: Integers, ahead: Integers
+    ) -> "CentreLines":
+        """Walk so many nodes (B,) of each line."""
+        zero = int(behind.max(initial=0))
+        along = _Lines(len(behind), zero + int(ahead.max(initial=0)) + 1)
+        along.set(zero, centre.origin, centre.direction, centre.normal)
+        along.walk(mesh, zero, (ahead, behind), centre.step, centre.sign, centre.part)
+        return cls(along, behind, ahead, zero)
+
+    @property
+    def position(self) -> Floats:
+        """Of the nodes."""
+        return self._lines.position
+
+    @property
+    def across(self) -> Floats:
+        """e_v at the nodes."""
+        return cross(self._lines.normal, self._lines.direction)
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals at the nodes."""
+        return self._lines.normal
+
+    def rows(self, rows: Integers) -> "CentreLines":
+        """Return some of the lines."""
+        return CentreLines(self._lines.part(rows), self.behind[rows], self.ahead[rows], self.zero)
+
+    def of(self, grid: Grid) -> "_Lines | None":
+        """Return the nodes that a grid has, if all of them were walked."""
+        if (self.behind < grid.behind).any() or (self.ahead < grid.ahead).any():
+            return None
+        return self._lines.part(
+            slice(None), slice(self.zero - grid.behind, self.zero + grid.ahead + 1)
+        )
+
 
 def walk_nodes(
-    mesh: TriangleMesh, centre: Centre, grid: Grid, cross_step: Floats, cells: Booleans
+    mesh: TriangleMesh,
+    centre: Centre,
+    grid: Grid,
+    cross_step: Floats,
+    cells: Booleans,
+    walked: CentreLines | None = None,
 ) -> Nodes:
     """Walk the centre line both ways, then the cross lines from its nodes, both ways.
 
-    Only the nodes that the cells with samples need are walked to; the others stay zero.
+    Only the nodes that the cells with samples need are walked to; the others stay zero. Centre
+    lines that were `walked` before are not walked again.
     """
     B, nu, nv = len(centre.step), grid.behind + grid.ahead + 1, grid.right + grid.left + 1
-    along = _Lines(B, nu)
-    along.set(grid.behind, centre.origin, centre.direction, centre.normal)
-    both = np.full(B, grid.ahead), np.full(B, grid.behind)
-    along.walk(mesh, grid.behind, both, centre.step, centre.sign, centre.part)
+    along = None if walked is None else walked.of(grid)
+    if along is None:
+        counts = np.full(B, grid.behind), np.full(B, grid.ahead)
+        along = CentreLines.walked(mesh, centre, *counts).of(grid)
+        assert along is not None
     e_v = cross(along.normal, along.direction)
 
     lines = _Lines(B * nu, nv)
@@ -185,6 +261,13 @@ class _Lines:
         self.position, self.direction, self.normal = (np.zeros((walks, count, 3)) for _ in range(3))
         self.away = np.zeros((walks, count))
         self.sharp, self.back = (np.zeros((walks, count), dtype=bool) for _ in range(2))
+
+    def part(self, rows: Integers | slice, nodes: slice = slice(None)) -> "_Lines":
+        """Return some nodes of some walks."""
+        some = _Lines(0, 0)
+        for name, values in vars(self).items():
+            setattr(some, name, values[rows, nodes])
+        return some
 
     def set(self, at: int, position: Floats, direction: Floats, normal: Floats) -> None:
         """Fill the node that the walks start at."""

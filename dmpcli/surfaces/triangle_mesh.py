@@ -360,6 +360,21 @@ class TriangleMesh:
             face.reshape(points.shape[:-1]),
         )
 
+    def closest_along(self, paths: Floats) -> tuple[Floats, Floats]:
+        """Closest points of paths (B, T, 3), mm, and smooth normals there, both (B, T, 3)."""
+        if not self.compiled:
+            found = self.closest(paths)
+            return found.position, found.normal
+        from dmpcli.surfaces.kernels import inverse
+
+        foot, normal = np.empty((2, *paths.shape))
+        doubt = np.empty(paths.shape[:2], dtype=bool)
+        inverse.closest_along(self.facets, np.ascontiguousarray(paths), foot, normal, doubt)
+        if doubt.any():
+            found = self.closest(paths[doubt])
+            foot[doubt], normal[doubt] = found.position, found.normal
+        return foot, normal
+
     def beyond_border(self, points: Floats, position: Floats, face: Integers) -> Booleans:
         """Tell which points (N, 3) lie beside the mesh rather than over it.
 

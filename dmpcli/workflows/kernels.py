@@ -9,6 +9,7 @@ import importlib.util
 import json
 import pickle
 from pathlib import Path
+from typing import Protocol
 
 import pyarrow as pa
 
@@ -27,6 +28,9 @@ MANY_ON_EACH = 100
 
 MANY = 30_000
 """... and on other surfaces, where only the tool's turn is theirs."""
+
+MANY_TO_MEASURE = 5000
+"""Strokes from which measuring them with kernels brings more than loading these costs."""
 
 OPTION = "kernels"
 """Their name in the options of a job that is drawn with them; numpy leaves no trace."""
@@ -86,18 +90,42 @@ def recorded(output: Location) -> Means | None:
     return None
 
 
-def kept() -> bool:
-    """Tell whether what an earlier run compiled is there, as far as names tell."""
-    from dmpcli.surfaces.kernels import ready
+def to_measure(asked: Kernels, strokes: int, on_mesh: bool) -> Means:
+    """Choose the means that the strokes of batches are measured with, all of a report alike.
 
+    Parameters
+    ----------
+    asked : {'auto', 'compiled', 'pure'}
+    strokes : int
+        Of all batches, in however many processes they are measured.
+    on_mesh : bool
+        Whether some may lie on meshes.
+
+    Raises
+    ------
+    InputError
+        Kernels are asked for, and numba is not here.
+    """
+    if asked == "compiled":
+        extras.load(extras.FAST, "--kernels compiled", "numba")
+        return "compiled"
+    many = strokes >= (MANY_ON_MESH if on_mesh else MANY_TO_MEASURE)
+    return "compiled" if asked == "auto" and many and there() else "pure"
+
+
+def kept(ready: "Ready | None" = None) -> bool:
+    """Tell whether what an earlier run compiled is there, as far as names tell."""
+    ready = _to_draw() if ready is None else ready
     return all(folder and any(Path(folder).glob(f"*{name}*.nbi")) for folder, name in ready.files())
 
 
-def get_ready() -> None:
-    """Load the kernels of a job, or compile them; say so where it takes time."""
-    from dmpcli.surfaces.kernels import ready
+def get_ready(ready: "Ready | None" = None) -> None:
+    """Load the kernels of a job, or compile them; say so where it takes time.
 
-    if not kept():
+    Those that draw, unless a module names others.
+    """
+    ready = _to_draw() if ready is None else ready
+    if not kept(ready):
         tell("kernels are compiled, once on this machine; it takes some 20 s of a processor")
     try:
         ready.load()
@@ -108,3 +136,19 @@ def get_ready() -> None:
             for path in Path(folder).glob(f"*{name}*.nb?") if folder else ():
                 path.unlink(missing_ok=True)
         ready.load()
+
+
+class Ready(Protocol):
+    """A module that knows the kernels of a job."""
+
+    def files(self) -> list[tuple[str, str]]:
+        """Folder where each is kept, and what the names of its files hold."""
+
+    def load(self) -> None:
+        """Call each once."""
+
+
+def _to_draw() -> Ready:
+    from dmpcli.surfaces.kernels import ready
+
+    return ready

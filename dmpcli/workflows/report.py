@@ -21,7 +21,6 @@ from dmpcli.records.learning_record import surface_key
 from dmpcli.records.storage import Location, located
 from dmpcli.reporting import document, pose_errors, provenance
 from dmpcli.reporting.batch import STROKES, Tables, measure
-from dmpcli.reporting.batch_measures import MeasurementContext
 from dmpcli.reporting.document import (
     FAR,
     MOST_ROWS,
@@ -31,14 +30,16 @@ from dmpcli.reporting.document import (
     reference_of,
     write_waves,
 )
+from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.ranking import Pupil
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.report_surface import AT_ONCE, ReportSurface, placed
 from dmpcli.reporting.stroke import ReportedStroke
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.reporting.strokes import labels_of, pairs_of, states_of, strokes_of
+from dmpcli.settings.report import ReportOptions
 from dmpcli.spatial.trajectory import Trajectory
-from dmpcli.workflows import recording
+from dmpcli.workflows import kernels, recording
 from dmpcli.workflows.report_jobs import ReportProcesses
 from dmpcli.workflows.report_sites import SiteGrounds
 from dmpcli.workflows.surface_input import SurfaceInput
@@ -50,6 +51,7 @@ WIDTH = 80
 """Columns that tables are printed in where no terminal says otherwise."""
 
 _SHOWN = 3
+_DEFAULTS = ReportOptions()
 _WAVES, _STROKES = "wave_heights.csv", "strokes.csv"
 
 
@@ -104,7 +106,7 @@ def report(
     paper: bool = False,
     view: bool = False,
     png: bool = False,
-    jobs: int = 1,
+    how: ReportOptions = _DEFAULTS,
 ) -> StrokeReport:
     """Compare strokes, write the report's folder where one is named, and tell what is doubtful.
 
@@ -129,8 +131,9 @@ def report(
         Whether to write a part that can be turned, too.
     png : bool
         Whether to write the figures as PNG, too.
-    jobs : int
-        Processes that measure large batches; no figure depends on it.
+    how : ReportOptions
+        In how many processes, on which no figure depends, and by what means large batches are
+        measured.
 
     Raises
     ------
@@ -155,8 +158,10 @@ def report(
     if read is not None:
         _warn_of_ends(parts, read)
     with _tables(output, any(part.batch for part in parts)) as tables:
-        sight = MeasurementContext(reference_of(parts), ground, normal, grounds=grounds)
-        parts = _measured(parts, sight, tables, jobs)
+        compiled = _by_kernels(parts, ground, grounds, how)
+        reference = reference_of(parts)
+        sight = MeasurementContext(reference, ground, normal, grounds=grounds, compiled=compiled)
+        parts = _measured(parts, sight, tables, how.jobs)
         if not paper:
             parts = _compared(parts)
         made = document.document(parts, said, paper)
@@ -335,6 +340,29 @@ def _tables(output: Location | None, batches: bool) -> Iterator[Tables | None]:
         for sink, head in zip((waves, *strokes), heads.values(), strict=True):
             csv.writer(sink, lineterminator="\n").writerow(head)
         yield Tables(waves, strokes[0] if strokes else None)
+
+
+def _by_kernels(
+    parts: list[DocumentPart],
+    ground: ReportSurface | None,
+    grounds: SiteGrounds | None,
+    how: ReportOptions,
+) -> bool:
+    """Choose whether kernels measure large batches, and have them ready."""
+    from dmpcli.surfaces.mesh import Mesh
+
+    total = sum(len(part.batch) for part in parts if part.batch)
+    if not total:
+        return False
+    on_mesh = grounds is not None or (ground is not None and isinstance(ground.surface, Mesh))
+    if kernels.to_measure(how.kernels, total, on_mesh) == "pure":
+        return False
+    from dmpcli.reporting import ready_kernels
+
+    # Other processes load what is kept; here it is needed only where this one measures.
+    if how.jobs == 1 or not kernels.kept(ready_kernels):
+        kernels.get_ready(ready_kernels)
+    return True
 
 
 def _measured(

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 
 from dmpcli.arrays import Integers
-from dmpcli.batch import process_pool
+from dmpcli.batch import memory, process_pool
 from dmpcli.errors import InputError
 from dmpcli.records.dataset import BatchFolder
 from dmpcli.reporting.batch import MeasuredStrokes, Measurement
@@ -58,6 +58,7 @@ def _begin(how: Measurement) -> None:
     """Begin a process: what is measured against comes once, and Ctrl-C is its parent's affair."""
     global _how
     _how = how
+    memory.keep()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

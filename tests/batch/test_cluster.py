@@ -58,8 +58,8 @@ def scheduler(tmp_path):
 @pytest.mark.slow
 def test_the_bytes_are_those_of_one_machine_also_when_a_worker_dies(learned, tmp_path, scheduler):
     address, workers = scheduler
-    table = write_pairs(tmp_path / "p.csv", 8000)
-    command = [DMPCLI, "generalize", learned, "--pairs", table, "--pairs-per-part", "400"]
+    table = write_pairs(tmp_path / "p.csv", 3000)
+    command = [DMPCLI, "generalize", learned, "--pairs", table, "--pairs-per-part", "150"]
     one, many = tmp_path / "one", tmp_path / "many"
     subprocess.run([*map(str, command), "-o", str(one), "-q"], check=True)
     drawing = subprocess.Popen([*map(str, command), "-o", str(many), "-q", "--cluster", address])

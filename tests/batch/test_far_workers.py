@@ -25,7 +25,7 @@ def store():
 
 def words_of(learned, table, output, *more):
     words = [DMPCLI, "generalize", learned, "-o", output, "--pairs", table, "-q", *more]
-    return [str(word) for word in [*words, "--pairs-per-part", "200"]]
+    return [str(word) for word in [*words, "--pairs-per-part", "100"]]
 
 
 def parts(store):
@@ -33,7 +33,7 @@ def parts(store):
 
 
 def test_the_only_worker_dies_and_another_one_that_comes_goes_on(learned, store, tmp_path):
-    table = write_pairs(tmp_path / "p.csv", 4000)
+    table = write_pairs(tmp_path / "p.csv", 2000)
     subprocess.run(words_of(learned, table, tmp_path / "here"), check=True)
     environment = environment_of(store)
     with cluster(tmp_path / "cluster", environment) as far:

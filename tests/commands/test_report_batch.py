@@ -3,13 +3,16 @@
 import csv
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from dmpcli import extras
 from dmpcli.cli import app
 from dmpcli.records import file_io, record, schemas
+from tests.extras_here import needs
 from tests.reporting.batches import put_batch
 from tests.reporting.example_files import GOAL, START, demonstration, put, wave
 
@@ -220,16 +223,44 @@ def test_a_part_that_lacks_a_pair_or_runs_backwards_is_named(tmp_path, demo):
     assert "column 't', row 509: time does not increase" in refused(demo, folder)
 
 
+TABLES = ("report.json", "strokes.csv", "wave_heights.csv")
+
+
+def written(output, *words):
+    result = dmpcli(*words, "-o", output, "-q")
+    assert result.exit_code == 0
+    return [result.stdout, *((output / name).read_bytes() for name in TABLES)]
+
+
 @pytest.mark.slow
-def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder):
-    written = []
-    for jobs in (1, 2):
-        output = tmp_path / f"jobs-{jobs}"
-        result = dmpcli(demo, folder, "-o", output, "--jobs", jobs, "-q")
-        assert result.exit_code == 0
-        names = ("report.json", "strokes.csv", "wave_heights.csv")
-        written.append([result.stdout, *((output / name).read_bytes() for name in names)])
-    assert written[0] == written[1]
+@pytest.mark.parametrize("means", ["pure", pytest.param("compiled", marks=needs(extras.FAST))])
+def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder, means):
+    one, two = (
+        written(tmp_path / f"jobs-{jobs}", demo, folder, "--jobs", jobs, "--kernels", means)
+        for jobs in (1, 2)
+    )
+    assert one == two
+
+
+@needs(extras.FAST)
+@pytest.mark.slow
+def test_kernels_print_what_numpy_prints_and_the_report_says_that_they_measured(
+    tmp_path, demo, folder
+):
+    found = {
+        means: written(tmp_path / means, demo, folder, "--kernels", means)
+        for means in ("pure", "compiled", "auto")
+    }
+    assert found["auto"] == found["pure"]  # so few are not worth loading them
+    documents = [json.loads(found[means][1])["files"][1] for means in ("pure", "compiled")]
+    assert "kernels" not in documents[0]
+    assert documents[1]["kernels"] == "compiled"
+    assert [found["pure"][i] for i in (0, 2, 3)] == [found["compiled"][i] for i in (0, 2, 3)]
+
+
+def test_kernels_that_are_asked_for_and_not_here_are_named(monkeypatch, demo, folder):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    assert "pip install 'dmpcli[fast]'" in refused(demo, folder, "--kernels", "compiled")
 
 
 def test_a_damaged_part_is_named_from_another_process_too(demo, folder):

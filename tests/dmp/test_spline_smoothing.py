@@ -80,15 +80,73 @@ def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("stroke", [corners, pen_lift])
-@pytest.mark.parametrize("sigma", [0.1, 0.5])
 def test_corners_and_lifts_stay_though_the_rest_is_smooth(stroke, sigma):
     t, truth = stroke()
-    for seed in range(3):
+    worst = []
+    for seed in range(4):
         off = errors(smoothed(t, noisy(truth, sigma, seed)), t, truth)
         # Over three axes: sigma of each.
-        assert np.sqrt(np.mean(off**2) / 3) <= 0.7 * sigma
-        assert off.max() <= 6.0 * sigma
+        assert np.sqrt(np.mean(off**2) / 3) <= 0.65 * sigma
+        worst.append(off.max())
+    assert np.median(worst) <= 4.4 * sigma
+    assert max(worst) <= 5.0 * sigma
+
+
+def test_at_corners_noise_does_not_accelerate():
+    """Beside the spline through the exact samples; these seeds went to 1.5 to 1.9 times."""
+    t, truth = corners()
+    true = peak(smoothed(t, truth)(t, 2))
+    for seed in (0, 19, 24, 26, 27):
+        assert peak(smoothed(t, noisy(truth, 0.1, seed))(t, 2)) <= 1.3 * true
+
+
+def polygon(seed, speed=50.0, legs=8):
+    """A way of straight legs at one speed, that turns by up to 115° between them."""
+    rng = np.random.default_rng(seed)
+    heading = np.cumsum(rng.uniform(-2.0, 2.0, legs))
+    move = np.column_stack([np.cos(heading), np.sin(heading), 0.0 * heading])
+    V = np.concatenate([np.zeros((1, 3)), np.cumsum(move * rng.uniform(10, 40, (legs, 1)), axis=0)])
+    way = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+    t = np.arange(0.0, way[-1] / speed, 0.01)
+    return t, np.column_stack([np.interp(speed * t, way, c) for c in V.T])
+
+
+def test_intervals_are_short_at_corners_only():
+    """Of eight legs with 0.02 mm of noise, the shortest lie within 0.1 s of the corners."""
+    for seed in range(3):
+        t, truth = polygon(seed)
+        spline = smoothed(t, noisy(truth, 0.02, 100 + seed))
+        off = errors(spline, t, truth)
+        assert off.max() <= 5.0 * 0.02
+        assert np.sqrt(np.mean(off**2)) <= 0.02
+        corner = t[1:-1][np.linalg.norm(np.diff(truth, 2, axis=0), axis=1) > 1e-6]
+        breaks = spline.spline.t[5:-5]
+        short = np.diff(breaks) < 0.011
+        middles = 0.5 * (breaks[:-1] + breaks[1:])[short]
+        assert short.any()
+        assert np.abs(middles[:, None] - corner).min(axis=1).max() <= 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+def test_letters_that_begin_and_end_in_motion_keep_their_ends_and_acceleration(sigma):
+    t, truth = letters()
+    true = peak(smoothed(t, truth)(t, 2))
+    found = [smoothed(t, noisy(truth, sigma, 40 + seed)) for seed in range(8)]
+    ends = np.array([errors(spline, t, truth)[[0, -1]] for spline in found])
+    assert np.median(ends) <= 0.8 * sigma
+    assert np.quantile(ends, 0.9) <= 1.5 * sigma
+    assert max(peak(spline(t, 2)) for spline in found) <= 1.5 * true
+
+
+def test_few_samples_in_motion_are_no_livelier_at_their_ends():
+    t = np.arange(401) / 100
+    truth = wave(t / 4.0, 120, 20)
+    true = peak(smoothed(t, truth)(t, 2))
+    for seed in range(30):
+        assert peak(smoothed(t, noisy(truth, 0.5, seed))(t, 2)) <= 1.5 * true
 
 
 @pytest.mark.parametrize("stroke", [six_seconds, letters, corners, pen_lift])

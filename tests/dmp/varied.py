@@ -19,6 +19,7 @@ from dmpcli.dmp import (
     demonstrations,
     feasibility,
     forced_model,
+    knot_refinement,
     learning,
     least_squares,
     noise,
@@ -543,7 +544,7 @@ def residuals_that_noise_explains_or_not():
             x[count // 3] += size
             for kind in (white, steps):
                 for first in (True, False):
-                    found += [spline_smoothing._doubted(x, design, kind, x, first)]
+                    found += [knot_refinement._doubted(x, design, kind, x, first)]
     return found
 
 
@@ -573,7 +574,7 @@ def splines_halved_at_corners():
         n = noise.Noise(np.eye(2), np.full(2, 0.05))
         for intervals in (4, 9, 30):
             design = least_squares.uniform(len(x), intervals)
-            halved = spline_smoothing._halved(design, design.coefficients(x), x, n)
+            halved = knot_refinement._halved(design, design.coefficients(x), x, n)
             found += [None] if halved is None else [halved[0].breaks, halved[1]]
     return found
 

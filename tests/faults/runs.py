@@ -145,15 +145,16 @@ def draw(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
 
 
 def telling(seeds: Iterable[int]) -> list[int]:
-    """Return the seeds that put a kind of fault on a command for the first time."""
-    seen: set[tuple[str, str]] = set()
+    """Return the seeds that put a kind of fault on its first or its second command."""
+    seen: dict[str, set[str]] = {}
     found = []
     for seed in seeds:
         command, kinds = draw(seed, generator(seed))
-        told = {(command, kind) for kind in kinds}
-        if not told <= seen:
-            seen |= told
+        on = [seen.setdefault(kind, set()) for kind in kinds]
+        if any(len(commands) < 2 and command not in commands for commands in on):
             found.append(seed)
+            for commands in on:
+                commands.add(command)
     return found
 
 

@@ -7,7 +7,7 @@ from tests.faults.runs import COMMANDS, MOVED, draw, generator, run, telling
 from tests.faults.world import World
 
 FEW = range(12)
-# Of many seeds those that put a kind of fault on a command for the first time.
+# Of many seeds those that put a kind of fault on its first or second command; make faults has all.
 MORE = telling([*range(12, 40), *range(1000, 1160)])
 
 
@@ -37,7 +37,7 @@ def test_these_seeds_put_on_every_kind_of_fault_and_run_every_command():
     drawn = [draw(seed, generator(seed)) for seed in MORE]
     assert {command for command, _ in drawn} == {MOVED, *COMMANDS}
     assert {kind for _, kinds in drawn for kind in kinds} == set(KINDS)
-    assert len({(command, kind) for command, kinds in drawn for kind in kinds}) > 125
+    assert len({(command, kind) for command, kinds in drawn for kind in kinds}) > 80
 
 
 @pytest.mark.slow

@@ -197,7 +197,7 @@ def test_no_line_is_loud_beyond_the_one_that_is_told():
             [9],
         ]
         size = 16 * 2 ** int(np.ceil(np.log2(n)))
-        told = motion._loud_at_most(speed, speed.sum(axis=1), size)
+        told = motion._loud_at_most(motion._roughness(speed), speed.sum(axis=1), size)
         spectrum = np.abs(np.fft.rfft(speed, size)) / speed.sum(axis=1)[:, None]
         last = np.array([np.flatnonzero(one >= 0.05)[-1] for one in spectrum])
         assert (last <= told).all()

@@ -14,7 +14,7 @@ from benchmarks.mutations.records import MAKES
 from benchmarks.mutations.worker import Asked, run, runs
 from dmpcli.errors import InputError, RefusedError
 
-COUNT = 120
+COUNT = 60
 
 
 def test_there_are_as_many_readers_as_the_files_that_are_read():

@@ -1,21 +1,26 @@
 """Strokes of a batch measured together have the figures that each has on its own."""
 
+import importlib.util
 import pickle
 
 import numpy as np
 import pytest
 
+from dmpcli import extras
 from dmpcli.dmp.smoothing import Trajectory as Recording
 from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.reporting import stroke_measures
 from dmpcli.reporting.batch import histogram, measure
-from dmpcli.reporting.batch_measures import FIGURES, MeasurementContext, measured_parts
+from dmpcli.reporting.batch_measures import measured_parts
+from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.report_surface import ReportSurface, placed
+from dmpcli.reporting.stroke_block import FIGURES
 from dmpcli.reporting.strokes import pairs_of, strokes_of
 from dmpcli.spatial import rotations
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
+from tests.extras_here import needs
 from tests.reporting.batches import put_batch
 from tests.reporting.example_files import (
     START,
@@ -71,16 +76,24 @@ def rows_one_by_one(folder, reference, ground=None, normal=None):
     return np.array(table, dtype=float)
 
 
-def together(folder, reference, ground=None, normal=None):
+def together(folder, reference, ground=None, normal=None, compiled=False):
     batch, odd = dataset.read(folder)
     assert odd == []
-    many = measure(batch, "b", MeasurementContext(reference, ground, normal), None, lambda _: None)
-    return many.table
+    sight = MeasurementContext(reference, ground, normal, compiled=compiled)
+    return measure(batch, "b", sight, None, lambda _: None).table
 
 
 def alike(folder, reference, *more):
     one, many = rows_one_by_one(folder, reference, *more), together(folder, reference, *more)
     np.testing.assert_allclose(many, one, rtol=1e-9, atol=1e-9)
+    return many
+
+
+def alike_by_kernels(folder, reference, ground=None, normal=None):
+    """Check what kernels measure; charts of meshes are inverted to a part of 1e-8 mm."""
+    one = rows_one_by_one(folder, reference, ground, normal)
+    many = together(folder, reference, ground, normal, compiled=True)
+    np.testing.assert_allclose(many, one, rtol=1e-8, atol=2e-8)
     return many
 
 
@@ -155,6 +168,28 @@ def test_on_a_plane_that_is_given(tmp_path):
     assert np.isfinite(column(table, "surface_distance_max")).all()
 
 
+@needs(extras.FAST)
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [{"closed": True}, {"end_heights": [3.0, 0.5]}, {}, {"band": 1}])
+def test_kernels_measure_strokes_of_all_kinds_as_each_is_measured(tmp_path, end):
+    normal = np.array([0.0, 0.1, 1.0]) / np.linalg.norm([0.0, 0.1, 1.0])
+    plane = ReportSurface("plane", Plane(START - [0.0, 0.0, 2.0], normal))
+    mixed = strokes(9, n=251) + strokes(8, n=400, seed=9) + strokes(4, n=5, seed=2)
+    mixed[3]["path"] = np.repeat(mixed[3]["path"][:1], 251, axis=0)
+    for i, stroke in enumerate(mixed):
+        turn = 0.2 * np.sin(stroke["t"] + i)
+        stroke["euler"] = np.stack([np.pi + turn, 0.5 * turn, turn], axis=-1)
+        stroke["path"] = stroke["path"] + 3.0 * np.sin(stroke["t"] / 7.0)[:, None] * normal
+    if "closed" in end:
+        mixed += [{**mixed[0], "path": circle(START)[:251], "ends": (START, START)}]
+    facts = {"over_surface": {"band": 1.0, "removed": 0.0, "offset": 0.0}} if "band" in end else end
+    folder = put_batch(tmp_path / "b", [mixed], facts=facts)
+    reference = taught(circle()) if "closed" in end else taught()
+    alike_by_kernels(folder, reference)
+    alike_by_kernels(folder, reference, plane, normal)
+    alike_by_kernels(folder, None, plane, normal)
+
+
 @pytest.mark.slow
 def test_on_a_mesh(tmp_path):
     mesh = Mesh(*fillet_mesh())
@@ -171,6 +206,8 @@ def test_on_a_mesh(tmp_path):
     folder = put_batch(tmp_path / "b", [made[:4], made[4:]])
     ground = ReportSurface("fillet", mesh, mesh.V, mesh.F)
     table = alike(folder, taught(), ground, None)
+    if importlib.util.find_spec("numba"):
+        alike_by_kernels(folder, taught(), ground)
     assert np.isnan(column(table, "nearest_rms")).sum() == 1
     assert column(table, "surface_tilt_max")[0] < 1.0
     # Without the surface a stroke that is not plane has no wave height.
@@ -194,6 +231,8 @@ def test_on_a_cylinder(tmp_path, model, count):
         del stroke["normal"]
     folder = put_batch(tmp_path / "b", [made], facts={"model": model})
     table = alike(folder, taught(), ReportSurface("tube", tube), None)
+    if importlib.util.find_spec("numba"):
+        alike_by_kernels(folder, taught(), ReportSurface("tube", tube))
     assert np.isfinite(column(table, "surface_tilt_mean")).all()
     assert np.isfinite(column(table, "surface_length_change")).all()
 
@@ -243,7 +282,7 @@ def test_only_some_strokes_are_read_again(tmp_path):
     batch, _ = dataset.read(put_batch(tmp_path / "b", [strokes(6), strokes(6, seed=8)]))
     some = list(measured_parts(batch, "b", MeasurementContext(taught()), np.array([2, 9])))
     assert np.concatenate([s.rows for s in some]).tolist() == [2, 9]
-    assert [s.stroke(0).label for s in some] == ["b[3]", "b[10]"]
+    assert [s.strokes([0])[0].label for s in some] == ["b[3]", "b[10]"]
 
 
 def test_the_worst_are_those_with_the_largest_figures(tmp_path):

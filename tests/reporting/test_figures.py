@@ -38,7 +38,7 @@ def planned(start, goal, height, **facts):
     return stroke
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def strokes():
     carried = trajectory(wave(NEW_START, NEW_GOAL, 49.2))
     return [
@@ -51,9 +51,13 @@ def strokes():
     ]
 
 
+@pytest.fixture(scope="module")
+def files(strokes):
+    return figures.gallery(strokes)
+
+
 @pytest.mark.slow
-def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes):
-    files = figures.gallery(strokes)
+def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes, files):
     names = {name.rsplit(".", 1)[0] for name in files}
     assert names == {
         "fig4_drag_plane",
@@ -66,8 +70,7 @@ def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes
 
 
 @pytest.mark.slow
-def test_pictures_open_and_hold_the_styles_of_their_roles(strokes):
-    files = figures.gallery(strokes)
+def test_pictures_open_and_hold_the_styles_of_their_roles(files):
     for name, content in files.items():
         if name.endswith(".png"):
             picture = matplotlib.image.imread(io.BytesIO(content))

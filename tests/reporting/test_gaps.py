@@ -17,6 +17,7 @@ from dmpcli.reporting.contact_figure import contact_figure
 from dmpcli.reporting.curve_names import named
 from dmpcli.reporting.gaps import gaps, line, usual_step
 from dmpcli.reporting.plane_figure import Beyond, plane_figure
+from dmpcli.reporting.pose_error_figure import pose_error_figure
 from dmpcli.reporting.strokes import strokes_of
 from dmpcli.reporting.summary import sentences
 from dmpcli.reporting.time_figure import time_figure
@@ -181,7 +182,7 @@ def test_poses_that_have_no_like_are_not_joined():
     kept = (t < 2.0) | (t > 4.0)
     holed = Trajectory(t[kept], whole.position[kept] + 0.1, None)
     pair = pose_errors.compared("b", "a", holed, whole)
-    figure = pose_errors.figure(pair)
+    figure = pose_error_figure(pair)
     assert np.diff(spans(figure.axes[0]), axis=1).max() < 0.05
 
 

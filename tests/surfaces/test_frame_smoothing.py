@@ -38,6 +38,32 @@ def test_the_response_to_a_crease_is_that_of_a_gaussian_of_the_same_width():
     )
 
 
+def test_the_turning_of_a_curved_surface_stays_and_ripple_goes():
+    """A sine over wavelengths of 40 and 3 mm: a gain of 2 g - g², with g of three averages."""
+    s = np.linspace(0.0, 120.0, 4001)[None, :, None]
+    position = s * np.array([0.6, 0.0, 0.8])
+    inside = slice(400, -400)
+    for wavelength, size in ((40.0, 0.1), (3.0, 0.01)):
+        turn = np.sin(2.0 * np.pi * s / wavelength)
+        out = frame_smoothing.smoothed(
+            rotations.exp(size * turn * np.array([1.0, 0.0, 0.0])), position, 2.0
+        )
+        gain = np.sinc(2.0 * 2.0 / wavelength) ** 3
+        share = -np.arctan2(out[0, :, 1, 2], out[0, :, 2, 2])
+        expected = size * (2.0 * gain - gain**2) * turn[0, :, 0]
+        np.testing.assert_allclose(share[inside], expected[inside], atol=2e-3 * size)
+
+
+def test_over_a_crease_frames_never_turn_beyond_either_side_by_more_than_six_tenths_of_a_degree():
+    s, position = paths(1, 4000)
+    for angle in np.radians([1.0, 5.0, 10.0, 20.0, 45.0, 89.0]):
+        axes = rotations.exp(np.where(s < 60.0, 0.0, angle) * np.array([0.0, 1.0, 0.0]))
+        out = frame_smoothing.smoothed(axes, position)
+        turned = np.arctan2(out[0, :, 0, 2], out[0, :, 2, 2])
+        beyond = max(-turned.min(), turned.max() - angle)
+        assert beyond <= np.radians(0.6)
+
+
 def test_a_path_alone_is_smoothed_as_among_others():
     _, position = paths()
     rng = np.random.default_rng(0)

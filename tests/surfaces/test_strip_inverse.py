@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from dmpcli.surfaces import strip_inverse
-from dmpcli.surfaces.inverse_chart import _by_steps, invert
+from dmpcli import extras
+from dmpcli.surfaces import strip_inverse, strip_pieces
+from dmpcli.surfaces.inverse_chart import _by_steps, invert, on_strips
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.strip_grid import Grid
-from tests.surfaces import cases
+from tests.extras_here import needs
+from tests.surfaces import cases, zoo
+from tests.surfaces.judge import Judge, traced
 
 S = np.linspace(0.0, 1.0, 120)
 
@@ -109,10 +112,78 @@ def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facet
 
 def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkeypatch):
     walked = []
-    monkeypatch.setattr(strip_inverse, "walk_nodes", lambda *given: walked.append(given[-1]))
-    charts = SimpleNamespace(mesh=None, centre=SimpleNamespace(step=np.ones((1, 1))))
+    monkeypatch.setattr(strip_pieces, "walk_nodes", lambda *given: walked.append(given[4]))
+    mesh = SimpleNamespace(compiled=False)
+    charts = SimpleNamespace(mesh=mesh, centre=SimpleNamespace(step=np.ones((1, 1))))
     at = np.array([[[0.5, 1.5]]])  # in the cell 3 along and 4 across
-    strip_inverse._Strip(charts, Grid(3, 4, 3, 4), np.ones((1, 1)), at, False)
+    strip_pieces.Strip(charts, Grid(3, 4, 3, 4), np.ones((1, 1)), at)
     wanted = np.zeros((1, 7, 7), dtype=bool)
     wanted[0, 2:5, 3:6] = True
     np.testing.assert_array_equal(walked[0], wanted)
+
+
+@needs(extras.FAST)
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
+@pytest.mark.parametrize("wide", [0.0, 4.0, 25.0])
+def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
+    for mesh, half, top in ((bumpy, 54.0, 5.0), (ball, 40.0, 100.0)):
+        charts = laid(mesh.with_kernels, half=half, top=top)
+        wanted = wave(charts, wide=wide, height=height)
+        drawn = charts.lift(wanted)
+        found = strip_inverse.found(charts, drawn.position)
+        pure = strip_inverse.found(laid(mesh, half=half, top=top), drawn.position)
+        assert found.rows.tolist() == pure.rows.tolist()
+        np.testing.assert_allclose(found.coordinates, wanted[found.rows], atol=2e-6)
+        np.testing.assert_allclose(found.coordinates, pure.coordinates, atol=2e-8)
+        np.testing.assert_allclose(found.axes, pure.axes, atol=1e-7)
+        assert found.miss.max(initial=0.0) <= 1e-6
+
+
+@needs(extras.FAST)
+@pytest.mark.slow
+def test_kernels_find_a_stroke_alike_alone_and_among_others(bumpy):
+    charts = laid(bumpy.with_kernels)
+    position = charts.lift(wave(charts)).position
+    together = strip_inverse.found(charts, position)
+    for row in (0, 2):
+        alone = strip_inverse.found(charts.rows(np.array([row])), position[row : row + 1])
+        np.testing.assert_array_equal(alone.coordinates[0], together.coordinates[row])
+        np.testing.assert_array_equal(alone.axes[0], together.axes[row])
+
+
+@needs(extras.FAST)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["drilled", "ribbed", "cone", "filleted"])
+def test_kernels_tell_alike_what_has_no_place_on_parts_with_edges(name):
+    mesh = zoo.mesh(name)
+    pairs = traced(Judge(mesh), 12, np.random.default_rng(4))
+    charts = mesh.charts(pairs.start, pairs.goal)
+    drawn = charts.lift(wave(charts, wide=3.0))
+    position = np.where(np.isfinite(drawn.position), drawn.position, 0.0)
+    pure = strip_inverse.found(charts, position)
+    kernels = mesh.with_kernels.charts(pairs.start, pairs.goal)
+    found = strip_inverse.found(kernels, position)
+    assert 0 < len(pure.rows) < 12
+    np.testing.assert_array_equal(found.rows, pure.rows)
+    np.testing.assert_allclose(found.coordinates, pure.coordinates, atol=2e-8)
+    strips = on_strips(kernels, position)
+    assert set(np.flatnonzero(strips.complete)) <= set(found.rows.tolist())
+    np.testing.assert_array_equal(
+        strips.complete, invert(charts, position).complete & strips.complete
+    )
+
+
+@needs(extras.FAST)
+@pytest.mark.slow
+def test_kernels_find_the_closest_points_of_paths(bumpy):
+    rng = np.random.default_rng(2)
+    charts = laid(bumpy)
+    path = charts.lift(wave(charts, height=2.0)).position
+    for paths in (path, path + 3.0 * rng.normal(size=path.shape), 4.0 * path):
+        foot, normal = bumpy.with_kernels.closest_along(paths)
+        there = bumpy.closest(paths)
+        apart = np.linalg.norm(paths - foot, axis=-1)
+        np.testing.assert_allclose(apart, there.distance, atol=1e-9)
+        np.testing.assert_allclose(foot, there.position, atol=1e-6)
+        np.testing.assert_allclose(normal, there.normal, atol=1e-6)

@@ -36,6 +36,7 @@ from dmpcli.surfaces import (
     sharp_edges,
     strip_grid,
     strip_inverse,
+    strip_pieces,
     tangential,
 )
 from dmpcli.surfaces.border_margin import BorderMargin
@@ -266,7 +267,7 @@ def strips_moved_over_feet():
         charts, foot, facet = charts.rows(np.flatnonzero(whole)), foot[whole], facet[whole]
         for off in (0.3, 5.0):
             guess = coordinates[whole, :, :2] + off * np.sin(np.arange(22.0)).reshape(11, 2)
-            for some, strip in strip_inverse._strips(charts, guess):
+            for some, strip in strip_pieces.strips(charts, guess):
                 found += [some, strip.shape, strip.step, strip.zero]
                 found += [strip.nodes.values, strip.nodes.stretch]
                 found += strip._where(guess[some], strip.step)
@@ -282,7 +283,7 @@ def splines_between_nodes():
     rng = np.random.default_rng(7)
     found: list = []
     for shape in ((1, 5, 2), (3, 6, 4)):
-        spline = strip_inverse.StripSpline(rng.normal(size=(*shape, 12)))
+        spline = strip_pieces.StripSpline(rng.normal(size=(*shape, 12)))
         for count in (7, 7, 4):
             pair = rng.integers(shape[0], size=(2, count))
             i = rng.integers(shape[1] - 1, size=(2, count))

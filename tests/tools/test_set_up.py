@@ -78,13 +78,25 @@ def place(tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A place with an environment: each takes seconds to make, so it is a difficult one at once."""
+    """A place with an environment: each takes seconds to make, so it is a difficult one at once.
+
+    It is interrupted once, and then made by two at once.
+    """
     folder = tmp_path_factory.mktemp("whole") / "Größe und Platz" / ("lang " * 40).strip()
     folder.mkdir(parents=True)
     place = Place(folder)
     shell = {"LC_ALL": "C", "LANG": "C", "HOME": "/dev/null/home"}
-    elsewhere = str(folder / "elsewhere")
-    assert "into .venv" in place.done(**shell, PIP_USER="1", PIP_TARGET=elsewhere)
+    shell |= {"PIP_USER": "1", "PIP_TARGET": str(folder / "elsewhere")}
+    how = {"cwd": folder, "env": place.environment | shell, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(place.command(), start_new_session=True, **how) as running:
+        while not (place.venv / "set-up.log").exists():
+            assert running.poll() is None
+            time.sleep(0.01)
+        os.killpg(running.pid, signal.SIGKILL)
+    place.stamped_too_early = place.stamp.exists()
+    two = [subprocess.Popen(place.command(), **how) for _ in range(2)]
+    place.told = [process.communicate()[1] for process in two]
+    assert [process.returncode for process in two] == [0, 0], place.told
     return place
 
 
@@ -166,6 +178,13 @@ def test_a_package_without_a_wheel_is_named_with_the_python(pip, tmp_path, monke
 
 
 @pytest.mark.slow
+def test_what_an_interrupted_one_left_is_made_whole_once_also_by_two_at_once(whole):
+    assert not whole.stamped_too_early
+    assert sorted(said.count("into .venv") for said in whole.told) == [0, 1]
+    assert whole.done() == ""
+
+
+@pytest.mark.slow
 def test_it_is_made_once_and_anew_when_lock_or_python_changes(whole):
     assert whole.done() == ""
     # An activated environment's Python is the environment's own: it must outlive its folder.
@@ -181,26 +200,6 @@ def test_it_is_made_once_and_anew_when_lock_or_python_changes(whole):
     whole.stamp.write_text(json.dumps(made | {"python": "3.11.0 elsewhere"}))
     # What stops it shows as well that it sets out to make it anew, and sooner.
     assert "without its module venv" in whole.refused(**whole.python_without("venv"))
-
-
-@pytest.mark.slow
-def test_what_an_interrupted_one_left_is_made_whole_once_also_by_two_at_once(place):
-    quiet = {"cwd": place.folder, "stderr": subprocess.DEVNULL}
-    running = subprocess.Popen(place.command(), start_new_session=True, **quiet)
-    while not (place.venv / "set-up.log").exists():
-        assert running.poll() is None
-        time.sleep(0.01)
-    os.killpg(running.pid, signal.SIGKILL)
-    running.wait()
-    assert not place.stamp.exists()
-    two = [
-        subprocess.Popen(place.command(), cwd=place.folder, stderr=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    told = [process.communicate()[1] for process in two]
-    assert [process.returncode for process in two] == [0, 0]
-    assert sorted(said.count("into .venv") for said in told) == [0, 1]
-    assert place.done() == ""
 
 
 @pytest.mark.slow

@@ -23,11 +23,13 @@ _ENTRIES = (
 
 def files() -> list[tuple[str, str]]:
     """Folder where each kernel is kept, and what the names of its files hold; empty where none."""
-    found = []
-    for entry in _ENTRIES:
-        stats, name = getattr(entry, "stats", None), getattr(entry, "__name__", "")
-        found.append((getattr(stats, "cache_path", None) or "", f".{name}-"))
-    return found
+    return [file_of(entry) for entry in _ENTRIES]
+
+
+def file_of(entry: object) -> tuple[str, str]:
+    """Return the same of one kernel."""
+    stats, name = getattr(entry, "stats", None), getattr(entry, "__name__", "")
+    return getattr(stats, "cache_path", None) or "", f".{name}-"
 
 
 def load() -> None:
@@ -67,5 +69,5 @@ def load() -> None:
     samples.lift(facets, strip, flat, flat, one, number, where, feet)
     facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)
     frame = np.tile(np.eye(3), (1, 3, 1, 1))
-    smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1)
+    smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1, 0.1)
     rotations.euler_of_paths(frame[:, :1], frame)

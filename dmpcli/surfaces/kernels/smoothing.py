@@ -41,12 +41,13 @@ def _averaged(arc: Floats, values: Floats, area: Floats, half: float, out: Float
 
 
 @kernel
-def smoothed(axes: Floats, position: Floats, width: float, passes: int) -> Floats:
-    """Frames (B, T, 3, 3) smoothed along paths (B, T, 3), mm."""
+def smoothed(axes: Floats, position: Floats, width: float, passes: int, crease: float) -> Floats:
+    """Frames (B, T, 3, 3) smoothed along paths (B, T, 3), mm, and twiced but over creases."""
     out = np.empty_like(axes)
     samples = axes.shape[1]
     arc = np.empty(samples)
     values, other, area = np.empty((samples, 6)), np.empty((samples, 6)), np.empty((samples, 6))
+    once = np.empty((samples, 6))
     for b in range(len(axes)):
         arc[0] = 0.0
         for t in range(samples):
@@ -58,7 +59,18 @@ def smoothed(axes: Floats, position: Floats, width: float, passes: int) -> Float
         for _ in range(passes):
             _averaged(arc, values, area, width, other)
             values, other = other, values
+        once[:] = values
+        for _ in range(passes):
+            _averaged(arc, values, area, width, other)
+            values, other = other, values
         for t in range(samples):
+            size = 0.0
+            for k in range(6):
+                size += (once[t, k] - values[t, k]) ** 2
+            size /= crease**2
+            share = 1.0 / (1.0 + size**2)
+            for k in range(6):
+                values[t, k] = once[t, k] + share * (once[t, k] - values[t, k])
             n = unit((values[t, 3], values[t, 4], values[t, 5]))
             e_v = across((values[t, 0], values[t, 1], values[t, 2]), n)
             e_u = cross(e_v, n)

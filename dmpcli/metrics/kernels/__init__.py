@@ -1,0 +1,1 @@
+"""Kernels: what `metrics` does by numpy for many strokes at once, compiled, stroke by stroke."""

@@ -1,0 +1,152 @@
+"""How strokes move and where they turn, compiled: one walk over the samples of each."""
+
+import math
+
+import numpy as np
+
+from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.compiled import kernel
+
+
+@kernel
+def charted(position: Floats, start: Floats, axes: Floats) -> Floats:
+    """u, v, w (3, B, n) of positions (3, B, n), mm, in charts: starts (B, 3), axes (B, 3, 3)."""
+    place = np.empty_like(position)
+    for b in range(position.shape[1]):
+        for k in range(3):
+            a, c, d = axes[b, 0, k], axes[b, 1, k], axes[b, 2, k]
+            for i in range(position.shape[2]):
+                place[k, b, i] = (
+                    a * (position[0, b, i] - start[b, 0])
+                    + c * (position[1, b, i] - start[b, 1])
+                    + d * (position[2, b, i] - start[b, 2])
+                )
+    return place
+
+
+@kernel
+def ways(dt: Floats, position: Floats, length: Floats, speed: Floats) -> None:
+    """Fill in lengths (B,), mm, and largest speeds (B,), mm/s, of strokes (3, B, n)."""
+    for b in range(position.shape[1]):
+        total, fastest = 0.0, 0.0
+        for i in range(len(dt)):
+            x = position[0, b, i + 1] - position[0, b, i]
+            y = position[1, b, i + 1] - position[1, b, i]
+            z = position[2, b, i + 1] - position[2, b, i]
+            step = math.sqrt(x * x + y * y + z * z)
+            total += step
+            fastest = max(fastest, step / dt[i])
+        length[b], speed[b] = total, fastest
+
+
+@kernel
+def smoothness(
+    dt: float, waves: Floats, ends: Floats, speed: Floats, jerk: Floats, rough: Floats
+) -> None:
+    """Fill in what smoothness is told by, of evenly sampled strokes (3, B, n), n ≥ 5.
+
+    Parameters
+    ----------
+    dt : float
+        s.
+    waves : array, shape (3, B, n - 2)
+        What lies between both ends, less the line from one to the other, mm.
+    ends : array, shape (2, 3, B)
+        First and last samples, mm.
+    speed : array, shape (B, n - 1)
+        mm/s.
+    jerk : array, shape (B,)
+        Sum of the squared third differences, of which the first and last count twice, mm².
+    rough : array, shape (B,)
+        Sums of the magnitudes of the speed's second differences, where zeros go before and follow,
+        mm/s.
+    """
+    n = waves.shape[2] + 2
+    padded, p = np.zeros(n + 3), np.empty((3, n))
+    for b in range(waves.shape[1]):
+        for k in range(3):
+            start, end = ends[0, k, b], ends[1, k, b]
+            p[k, 0], p[k, n - 1] = start, end
+            for i in range(1, n - 1):
+                p[k, i] = (start + (i / (n - 1)) * (end - start)) + waves[k, b, i - 1]
+        total, first, last = 0.0, 0.0, 0.0
+        for i in range(n - 3):
+            off = 0.0
+            for k in range(3):
+                third = p[k, i + 3] - 3.0 * (p[k, i + 2] - p[k, i + 1]) - p[k, i]
+                off += third * third
+            total += off
+            first = off if i == 0 else first
+            last = off
+        jerk[b] = total + first + last
+        for i in range(n - 1):
+            x, y, z = p[0, i + 1] - p[0, i], p[1, i + 1] - p[1, i], p[2, i + 1] - p[2, i]
+            padded[i + 2] = math.sqrt(x * x + y * y + z * z) / dt
+            speed[b, i] = padded[i + 2]
+        total = 0.0
+        for i in range(n + 1):
+            total += abs(padded[i + 2] - 2.0 * padded[i + 1] + padded[i])
+        rough[b] = total
+
+
+@kernel
+def less_line(p: Floats, waves: Floats) -> None:
+    """Fill in (3, B, n - 2) what lies between both ends, less the line from one to the other."""
+    n = p.shape[2]
+    for k in range(3):
+        for b in range(p.shape[1]):
+            start, end = p[k, b, 0], p[k, b, n - 1]
+            for i in range(1, n - 1):
+                waves[k, b, i - 1] = p[k, b, i] - (start + (i / (n - 1)) * (end - start))
+
+
+@kernel
+def _walked(v: Floats, b: int, least: float, stroke: Integers, sample: Integers, held: int) -> int:
+    """Turning points of one signal, see `wave_height._turning_points`; how many there are then."""
+    low, high, way = 0, 0, 0
+    for i in range(v.shape[1]):
+        here = v[b, i]
+        if way >= 0 and here > v[b, high]:
+            high = i
+        if way <= 0 and here < v[b, low]:
+            low = i
+        if way >= 0 and v[b, high] - here >= least:
+            if way != 0:
+                if held < len(stroke):
+                    stroke[held], sample[held] = b, high
+                held += 1
+            low, way = i, -1
+        elif way <= 0 and here - v[b, low] >= least:
+            if way != 0:
+                if held < len(stroke):
+                    stroke[held], sample[held] = b, low
+                held += 1
+            high, way = i, 1
+    return held
+
+
+@kernel
+def turning_points(
+    v: Floats, least: Floats, looked: Booleans, stroke: Integers, sample: Integers
+) -> int:
+    """Find where signals (B, n) turn back by `least` (B,) or more; return how many places.
+
+    As many of them as there is room for are filled in; see `wave_height._turning_points`.
+    """
+    held = 0
+    for b in range(len(v)):
+        if looked[b]:
+            held = _walked(v, b, least[b], stroke, sample, held)
+    return held
+
+
+@kernel
+def swings(v: Floats) -> Floats:
+    """Range of each signal (B, n), shape (B,)."""
+    found = np.empty(len(v))
+    for b in range(len(v)):
+        low, high = v[b, 0], v[b, 0]
+        for i in range(v.shape[1]):
+            low, high = min(low, v[b, i]), max(high, v[b, i])
+        found[b] = high - low
+    return found
