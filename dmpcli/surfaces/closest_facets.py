@@ -100,7 +100,7 @@ class _Tree:
 
         self._V, self._faces = V, faces
         self._F = F if faces is None else F.take(faces, axis=0)
-        self._low, self._high = box or (np.full(3, -np.inf), np.full(3, np.inf))
+        self._box: tuple[Floats, Floats] = box or (np.full(3, -np.inf), np.full(3, np.inf))
         self._tree: AABB = igl.AABB()
         self._tree.init(V, self._F)
 
@@ -114,7 +114,8 @@ class _Tree:
 
     def room(self, points: Floats) -> Floats:
         """Squared distances of points (N, 3) in the box from its ends, mm²."""
-        room = np.minimum(points - self._low, self._high - points).min(axis=1)
+        low, high = self._box
+        room = np.minimum(points - low, high - points).min(axis=1)
         return np.where(room > 0.0, room * room, 0.0)
 
 
