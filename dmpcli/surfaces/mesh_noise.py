@@ -58,6 +58,13 @@ def noise(
     array, shape (m,)
         0 where the mesh is smooth.
     """
+    around = unit(_at_corners(normals, topology.faces))
+    tilt = np.arcsin(np.minimum(length(cross(face_normals, around))[:, 0], 1.0))
+    between = np.radians(dihedrals.mean(axis=1))
+    # A mean of ratios: the large angles of noise must not speak for a smooth region beside it.
+    own = np.minimum(tilt / np.maximum(between, 1e-9), 1.0) * (between > np.radians(_LEAST))
+    if own.max(initial=0.0) < (1.0 - 1e-9) * _TILTED:
+        return np.zeros(len(corners))  # nor are means above it
     edges = np.roll(corners, -1, axis=1) - corners
     after = topology.neighbours
     # Positive at convex edges: the normals turn about the edge, which runs counter-clockwise.
@@ -66,11 +73,6 @@ def noise(
     mixed = _any(bent & (turn > 0.0)) & _any(bent & (turn < 0.0))
     if not mixed.any():
         return np.zeros(len(corners))
-    around = unit(_at_corners(normals, topology.faces))
-    tilt = np.arcsin(np.minimum(length(cross(face_normals, around))[:, 0], 1.0))
-    between = np.radians(dihedrals.mean(axis=1))
-    # A mean of ratios: the large angles of noise must not speak for a smooth region beside it.
-    own = np.minimum(tilt / np.maximum(between, 1e-9), 1.0) * (between > np.radians(_LEAST))
     area = length(cross(edges[:, 0], edges[:, 1]))[:, 0]
     size = length(edges)[..., 0].mean(axis=1)
     seen = np.stack([mixed, own, tilt, between, size], axis=1)
