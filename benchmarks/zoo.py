@@ -52,7 +52,7 @@ def main() -> None:
         mesh = zoo.mesh(name)
         found = verdicts(mesh, pairs, seed)
         all_found.append(found)
-        noisy = f"{100.0 * mesh.noisy_share:.1f}"
+        noisy = f"{100.0 * mesh.shape.noisy_share:.1f}"
         print(row(name, found, str(len(mesh.F)), noisy), flush=True)
     patches, anywhere = (added(list(some)) for some in zip(*all_found, strict=True))
     print(row("all", (patches, anywhere), "", ""))

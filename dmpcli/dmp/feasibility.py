@@ -156,6 +156,16 @@ def nearly_closed(skill: Skill) -> bool:
     return skill.closed or float(skill.goal[0]) < NEARLY_CLOSED * _extent(skill)
 
 
+def sideways(skill: Skill) -> float:
+    """How far the demonstrated stroke leads away from the line from its start to its goal, mm.
+
+    Of a closed one: from its start.
+    """
+    t = np.linspace(0.0, skill.duration, _SAMPLES)
+    off = np.abs(demonstrated_scale(skill, t)[:, :2])
+    return float(np.hypot(*off.T).max() if skill.closed else off[:, 1].max())
+
+
 def _extent(skill: Skill) -> float:
     return extent(demonstrated_scale(skill, np.linspace(0.0, skill.duration, _SAMPLES))[:, :3])
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from dmpcli.dmp.canonical_system import Basis, phase
 from dmpcli.dmp.force_profile import LEAST, ForceProfile
 from dmpcli.dmp.options import ForcingScale, Learning, Model
 from dmpcli.dmp.transformation_system import TransformationGains
+
+_HELD = 4
+"""Responses that a skill remembers."""
 
 
 @dataclass(frozen=True)
@@ -249,10 +253,28 @@ class Skill:
         t : array, shape (T,)
             Non-decreasing from 0, s, on the demonstration's time scale.
         """
-        step = transformation_system.longest_step(self.spring, self.duration, len(self.basis))
-        a, b, c = transformation_system.homogeneous(self.spring, t)
-        forced = transformation_system.forced(self.spring, self.forcing, t, step)
-        return Response(a, b, c, forced)
+        key = np.asarray(t, dtype=float).tobytes()
+        known = self._responses.pop(key, None)
+        if known is None:
+            step = transformation_system.longest_step(self.spring, self.duration, len(self.basis))
+            a, b, c = transformation_system.homogeneous(self.spring, t)
+            forced = transformation_system.forced(self.spring, self.forcing, t, step)
+            for part in (a, b, c, forced):
+                part.flags.writeable = False
+            known = Response(a, b, c, forced)
+            while len(self._responses) >= _HELD:
+                del self._responses[next(iter(self._responses))]
+        self._responses[key] = known
+        return known
+
+    @cached_property
+    def _responses(self) -> "dict[bytes, Response]":
+        """The last ones, by their times: where every pair has its own surface they come again."""
+        return {}
+
+    def __getstate__(self) -> dict[str, object]:
+        # What is held stays; another process begins with nothing.
+        return {name: value for name, value in vars(self).items() if name != "_responses"}
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from dmpcli.records.mesh_polygons import Triangles
 if TYPE_CHECKING:
     from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.open_patches import Patch
+    from dmpcli.surfaces.topology import Adjacency
 
 UNITS = LENGTH
 """mm in each unit of length that a mesh file may be in."""
@@ -38,11 +39,14 @@ class MeshFile(NamedTuple):
         component.
     remarks : list of str
         What was mended, and what looks odd.
+    adjacency : Adjacency, optional
+        Of the faces.
     """
 
     V: Floats
     F: Integers
     remarks: list[str]
+    adjacency: "Adjacency | None" = None
 
 
 def decode(source: Source, unit: str = "mm", option: str = "--unit") -> MeshFile:
@@ -77,7 +81,7 @@ def _decoded(name: str, found: Triangles, unit: str) -> MeshFile:
     size = float(np.linalg.norm(np.ptp(mesh.V, axis=0)))
     if not SMALL < size < LARGE:
         remarks.append(f"it measures {size:.3g} mm across as {unit}: check its unit of length")
-    return MeshFile(mesh.V, mesh.F, remarks)
+    return MeshFile(mesh.V, mesh.F, remarks, mesh.adjacency)
 
 
 def waiting(source: Source) -> str | None:
@@ -101,7 +105,7 @@ def summary(mesh: MeshFile, shape: "Mesh | None" = None) -> str:
     from dmpcli.surfaces.mesh_repair import components
 
     error = chordal_error(mesh.V, mesh.F)
-    pieces, noisy = components(mesh.F), (shape or Mesh(mesh.V, mesh.F)).noisy_share
+    pieces, noisy = components(mesh.F), (shape or Mesh(mesh.V, mesh.F)).shape.noisy_share
     rough = f"; {_percent(noisy)} of its area is noisy, normals are averaged there"
     return (
         f"{len(mesh.F)} faces, {pieces} {'piece' if pieces == 1 else 'pieces'}, chordal error "
@@ -147,7 +151,7 @@ def description(source: Source) -> dict[str, Any]:
         "likely_unit": _likely_unit(float(np.linalg.norm(high - low))),
         "error_median": error.median,
         "error_largest": error.largest,
-        "noisy_share": Mesh(mesh.V, mesh.F).noisy_share,
+        "noisy_share": Mesh(mesh.V, mesh.F, mesh.adjacency).shape.noisy_share,
         "room": [as_options(one) for one in open_patches(mesh.V, mesh.F)],
         "remarks": mesh.remarks,
     }

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 import scipy
 
-from dmpcli.arrays import AnyArray, Floats, Integers
+from dmpcli.arrays import AnyArray, Integers
 from dmpcli.records import file_io, surface
 from dmpcli.records.file_io import Source
 from dmpcli.records.mesh import MeshFile
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.surfaces.triangle_mesh import MeshParts
+from dmpcli.surfaces.topology import Adjacency
 from dmpcli.version import __version__
 
-FORMAT = 1
+FORMAT = 2
 
 LARGEST = 8 * 2**30
 """Bytes that a folder holds; beyond them what was used longest ago goes."""
@@ -88,7 +88,7 @@ class MeshStore:
             return found if pose is None else surface.placed(found, pose)
         if pose is not None:
             found = found._replace(V=pose.apply(found.V))
-        mesh = Mesh(found.V, found.F)
+        mesh = Mesh(found.V, found.F, found.adjacency)
         if entry is not None:
             self._keep(entry, found, mesh)
         return found, mesh
@@ -118,7 +118,7 @@ class MeshStore:
             temporary, stream = file_io.temporary_of(entry)
             try:
                 with stream:
-                    np.savez(stream, **_packed(found, mesh))  # type: ignore[arg-type]
+                    np.savez(stream, **_packed(found, mesh.topology.adjacency))  # type: ignore[arg-type]
                 temporary.replace(entry)
             finally:
                 temporary.unlink(missing_ok=True)
@@ -150,31 +150,16 @@ def _igl_version() -> str:
     return version("libigl")
 
 
-def _packed(found: MeshFile, mesh: Mesh) -> dict[str, AnyArray]:
-    """Return the arrays of an entry: numbers of vertices and faces in four bytes each.
-
-    Most corners of one vertex have one normal: the vertex', and the others as they are.
-    """
-    parts = mesh.parts
-    normals = np.zeros((len(mesh.V), 3))
-    normals[mesh.F] = parts.corner_normals
-    # Bit by bit: -0.0 is another number than 0.0 here.
-    own, of_vertex = parts.corner_normals, normals[mesh.F]
-    other = (own.view(np.int64) != of_vertex.view(np.int64)).any(axis=-1)
+def _packed(found: MeshFile, adjacency: Adjacency) -> dict[str, AnyArray]:
+    """Return the arrays of an entry: numbers of vertices and faces in four bytes each."""
     packed: dict[str, AnyArray] = {
-        "V": mesh.V,
-        "F": mesh.F.astype(np.int32),
-        "neighbours": parts.neighbours.astype(np.int32),
-        "normals": normals,
-        "other": np.flatnonzero(other).astype(np.int32),
-        "others": own[other],
-        "heights": parts.heights,
+        "V": found.V,
+        "F": found.F.astype(np.int32),
+        "neighbours": adjacency.neighbours.astype(np.int32),
         "remarks": np.frombuffer(json.dumps(found.remarks).encode(), dtype=np.uint8),
     }
-    if parts.components.any():
-        packed["components"] = parts.components.astype(np.int32)
-    if parts.noise.any():
-        packed["noise"] = parts.noise
+    if adjacency.components.any():
+        packed["components"] = adjacency.components.astype(np.int32)
     return packed
 
 
@@ -183,27 +168,15 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
     try:
         with np.load(entry, allow_pickle=False) as packed:
             held = {name: packed[name] for name in packed.files}
-        F = _whole(held["F"])
-        normals = held["normals"][F]
-        normals.reshape(-1, 3)[held["other"]] = held["others"]
-        zeros = np.zeros(len(F))
-        parts = MeshParts(
-            _whole(held["neighbours"]),
-            _whole(held["components"]) if "components" in held else zeros.astype(np.int64),
-            normals,
-            held.get("noise", zeros),
-            held["heights"],
-        )
+        V, F = held["V"].astype(float), _whole(held["F"])
+        pieces = held.get("components")
+        components = np.zeros(len(F), dtype=np.int64) if pieces is None else _whole(pieces)
+        adjacency = Adjacency(_whole(held["neighbours"]), components)
         remarks = json.loads(held["remarks"].tobytes())
     except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
         return None
-    mesh = Mesh.with_parts(_floats(held["V"]), F, parts)
-    return MeshFile(mesh.V, mesh.F, remarks), mesh
+    return MeshFile(V, F, remarks, adjacency), Mesh(V, F, adjacency)
 
 
 def _whole(values: AnyArray) -> Integers:
     return values.astype(np.int64)
-
-
-def _floats(values: AnyArray) -> Floats:
-    return values.astype(float)

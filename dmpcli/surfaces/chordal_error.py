@@ -55,31 +55,63 @@ def chordal_error(V: Floats, F: Integers) -> ChordalError:
     -------
     ChordalError
     """
-    worst = heights(V, F, Topology(F, len(V)))
+    normals = igl.per_corner_normals(V, F, CREASE).reshape(-1, 3, 3)
+    after, corners = Topology(F, len(V)).neighbours, V[F]
+    flat = unit(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]))
+    cosine = dot(flat[:, None], flat[after])[..., 0]
+    worst = heights(corners, normals, after, np.arccos(np.clip(cosine, -1.0, 1.0)))
     return ChordalError(float(np.median(worst)), float(worst.max()))
 
 
-def heights(V: Floats, F: Integers, topology: Topology) -> Floats:
-    """Estimate the chordal error of each face, shape (m,), mm; see `chordal_error`."""
-    normals = igl.per_corner_normals(V, F, CREASE).reshape(-1, 3, 3)
-    worst, total = np.zeros(len(F)), np.zeros(len(F))
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        edge, turn = V[F[:, b]] - V[F[:, a]], normals[:, b] - normals[:, a]
-        sagitta = np.einsum("fi,fi->f", edge, turn) / 8.0
-        worst = np.maximum(worst, np.abs(sagitta))
-        total += sagitta
-    worst = np.maximum(worst, np.abs(total) * (4.0 / 9.0))
-    return np.minimum(worst, _UNEVEN * _across_edges(V[F], topology.neighbours))
+def heights(corners: Floats, normals: Floats, after: Integers, angles: Floats) -> Floats:
+    """Estimate the chordal error of each of m faces; see `chordal_error`.
 
+    Parameters
+    ----------
+    corners : array, shape (m, 3, 3)
+        mm.
+    normals : array, shape (m, 3, 3)
+        Unit vectors at the corners, by the areas about them, apart across creases.
+    after : array of int, shape (m, 3)
+        See `Topology.neighbours`.
+    angles : array, shape (m, 3)
+        Between facets across the edges, rad; of no meaning at borders.
 
-def _across_edges(corners: Floats, after: Integers) -> Floats:
-    """Largest height w θ/8 of each face and its neighbours (m, 3) across their edges, (m,), mm."""
+    Returns
+    -------
+    array, shape (m,)
+        mm.
+    """
     edges = np.roll(corners, -1, axis=1) - corners
-    twice = cross(edges[:, 0], edges[:, 1])
-    area, normal = length(twice)[:, 0], unit(twice)
-    cosine = dot(normal[:, None], normal[after])[..., 0]
-    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-    smooth = (after >= 0) & (angle < np.radians(CREASE))
-    width = np.minimum(area[:, None], area[after]) / length(edges)[..., 0]
-    largest: Floats = np.max(np.where(smooth, width * angle / 8.0, 0.0), axis=1)
-    return largest
+    sagitta = dot(edges, np.roll(normals, -1, axis=1) - normals)[..., 0] / 8.0
+    worst = np.abs(sagitta).max(axis=1)
+    worst = np.maximum(worst, np.abs(sagitta.sum(axis=1)) * (4.0 / 9.0))
+    # The largest height w θ/8 across the edges.
+    area = length(cross(edges[:, 0], edges[:, 1]))[:, 0]
+    smooth = (after >= 0) & (angles < np.radians(CREASE))
+    width = np.minimum(area[:, None], area.take(after)) / length(edges)[..., 0]
+    largest = np.max(np.where(smooth, width * angles / 8.0, 0.0), axis=1)
+    return np.asarray(np.minimum(worst, _UNEVEN * largest))
+
+
+def split_normals(V: Floats, F: Integers, face_normals: Floats) -> Floats:
+    """Normals at the corners of faces, shape (m, 3, 3), as `heights` wants them.
+
+    Parameters
+    ----------
+    V : array, shape (n, 3)
+        mm.
+    F : array of int, shape (m, 3)
+    face_normals : array, shape (m, 3)
+        Unit vectors.
+    """
+    weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_AREA
+    normals: Floats = igl.per_vertex_normals(V, F, weighting).take(F, axis=0)
+    # Where no face leans off the mean about a vertex by half a crease, no two meet at one.
+    leaning = dot(normals, face_normals[:, None])[..., 0] < np.cos(np.radians(0.5 * CREASE))
+    bent = np.zeros(len(V), dtype=bool)
+    bent[F[leaning]] = True
+    if bent.any():
+        apart = igl.per_corner_normals(V, F, CREASE).reshape(-1, 3, 3)
+        normals = np.where(bent[F][..., None], apart, normals)
+    return normals

@@ -167,7 +167,7 @@ def hit(mesh: TriangleMesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     # facet to facet does not.
     stands_off = np.zeros(len(aim.steps))
     if shot is by_steps:
-        stands_off = mesh.reach[mesh.search(aim.goal)[1]]
+        stands_off = mesh.reach_at(mesh.search(aim.goal)[1])
     found, ends, miss = _corrected(mesh, aim, shot, stands_off)
     missed = np.flatnonzero(miss > HIT)
     if len(missed):
@@ -228,7 +228,7 @@ def _corrected(
 
 def corrected(mesh: TriangleMesh, aim: Aim) -> tuple[Aim, Ends, Booleans]:
     """Correct shots along the smooth normal from where they aim, and no others; see `hit`."""
-    found, ends, miss = _corrected(mesh, aim, by_steps, mesh.reach[mesh.search(aim.goal)[1]])
+    found, ends, miss = _corrected(mesh, aim, by_steps, mesh.reach_at(mesh.search(aim.goal)[1]))
     return found, ends, miss <= HIT
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import across, cross, dot, length, turned, unit
-from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
+from dmpcli.surfaces.mesh_shape import CREASE
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 SHARP = np.cos(np.radians(CREASE))
 # The other side of a wall, or another fold of the surface: its normal is turned by more than 120°.
@@ -144,7 +145,7 @@ def advance(mesh: TriangleMesh, front: Front) -> tuple[Front, Marks]:
     sharp = ~other & (turn < SHARP)
     # A walk that comes back from beyond a hole must land where it was heading.
     allowed = np.where(was_off, LANDING * front.away, JUMP * h[:, 0])
-    jump = gap > np.maximum(allowed, mesh.reach[face])
+    jump = gap > np.maximum(allowed, mesh.reach_at(face))
     off = other | mesh.beyond_border(guess, foot, face) | (~sharp & jump)
     mark = off[:, None]
     foot = np.where(mark, guess, foot)

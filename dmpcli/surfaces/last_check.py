@@ -10,8 +10,9 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import dot, length
+from dmpcli.surfaces.mesh_shape import CREASE
 from dmpcli.surfaces.surface import Status
-from dmpcli.surfaces.triangle_mesh import CREASE, TriangleMesh
+from dmpcli.surfaces.triangle_mesh import TriangleMesh
 
 # Start and goal are met within this, mm, and within the noise of the mesh there, which tilts its
 # facets; a geodesic may be so much shorter than its chord.
@@ -72,7 +73,7 @@ def refusals(
         `Status`: TORN, MISSED, LOST or TILTED, else DRAWN.
     """
     on = ~np.maximum.accumulate(feet.outside, axis=1)
-    plane = mesh.planes[feet.face]
+    plane = mesh.planes_at(feet.face)
     wrong = [
         (_torn(feet, on), Status.TORN),
         (_missed(mesh, feet, on, start, goal, goals), Status.MISSED),
@@ -89,7 +90,7 @@ def unsound(mesh: TriangleMesh, feet: Feet) -> Booleans:
     Of a torn stroke these are both points beside the tear.
     """
     jumps = _jumps(feet)
-    plane = mesh.planes[feet.face]
+    plane = mesh.planes_at(feet.face)
     wrong = _off(plane, feet) > _ON
     wrong[:, 1:] |= jumps
     wrong[:, :-1] |= jumps
@@ -103,7 +104,7 @@ def shorter_than_chord(
 ) -> Booleans:
     """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise."""
     chord = length(goal - start)[:, 0]
-    noise = mesh.noise[mesh.search(np.stack([start, goal]).reshape(-1, 3))[1]]
+    noise = mesh.noise_at(mesh.search(np.stack([start, goal]).reshape(-1, 3))[1])
     height = 6.0 * noise.reshape(2, -1).max(axis=0)
     smooth = np.sqrt(np.maximum(chord**2 - height**2, 0.0))
     return np.asarray(lengths < smooth - MET)
@@ -129,7 +130,7 @@ def _missed(
     for at, point, of in ((0, start, 0.0 * goals), (-1, goal, goals)):
         there = np.all(np.abs(feet.coordinates[:, at, :2] - of[:, :2]) < _SAME, axis=1)
         off = length(feet.position[:, at] - point)[:, 0]
-        missed |= there & on[:, at] & (off > MET + mesh.noise[feet.face[:, at]])
+        missed |= there & on[:, at] & (off > MET + mesh.noise_at(feet.face[:, at]))
     return missed
 
 
@@ -155,7 +156,7 @@ def _leaning(
     """Rows and samples of the points whose normals lean off their facets outside noise."""
     lean = np.abs(np.einsum("bti,bti->bt", feet.normal, plane[..., :3]))
     rows, samples = np.nonzero((lean < _TILTED) & on)
-    smooth = mesh.noise[feet.face[rows, samples]] == 0.0
+    smooth = mesh.noise_at(feet.face[rows, samples]) == 0.0
     rows, samples = rows[smooth], samples[smooth]
     if len(rows) == 0:
         return rows, samples

@@ -220,10 +220,8 @@ class MeshCharts:
 
     def _crosses_noise(self, foot: Floats) -> Booleans:
         """Tell which strokes (R, T, 3) on the mesh come over noisy facets, shape (R,)."""
-        if not self.mesh.noise.any():
-            return np.zeros(len(foot), dtype=bool)
         face = self.mesh.search(foot.reshape(-1, 3))[1].reshape(foot.shape[:2])
-        return np.asarray((self.mesh.noise[face] > 0.0).any(axis=1))
+        return np.asarray((self.mesh.noise_at(face) > 0.0).any(axis=1))
 
     def _improve(self, rows: Integers, coordinates: Floats, foot: Floats, axes: Floats) -> Integers:
         """Put the strokes of some pairs where unfolding leads, if it confirms the strip's: which.
@@ -233,7 +231,7 @@ class MeshCharts:
         exact, turned, _, status = self._unfold(rows, coordinates)
         face = self.mesh.search(exact.reshape(-1, 3))[1].reshape(exact.shape[:2])
         apart = length(exact - foot[rows])[..., 0]
-        near = (apart <= self.mesh.reach[face]).all(axis=1)
+        near = (apart <= self.mesh.reach_at(face)).all(axis=1)
         good = near & (status == Status.DRAWN)
         foot[rows[good]], axes[rows[good]] = exact[good], turned[good]
         better: Integers = rows[good]
@@ -377,11 +375,11 @@ def _landed(mesh: TriangleMesh, first: Aim, aim: Aim, ends: geodesic_shooting.En
     There are none over holes on solids, where what was stepped over is a rib or a groove.
     """
     landed, face = mesh.search(ends.position)
-    there = length(landed - first.goal)[:, 0] <= geodesic_shooting.HIT + mesh.noise[face]
+    there = length(landed - first.goal)[:, 0] <= geodesic_shooting.HIT + mesh.noise_at(face)
     normal = first.sign * mesh.closest(first.goal).normal
     there &= dot(normal, ends.normal)[:, 0] > 0.0
     short = last_check.shorter_than_chord(mesh, first.origin, first.goal, aim.length[:, 0])
-    solid = (mesh.outward[first.part] != 0.0) & (mesh.noise[face] == 0.0)
+    solid = (mesh.outward[first.part] != 0.0) & (mesh.noise_at(face) == 0.0)
     solid &= len(mesh.slits) == 0
     return np.asarray(there & ~short & ~(ends.off & solid))
 

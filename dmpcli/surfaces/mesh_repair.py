@@ -16,6 +16,9 @@ from scipy.spatial import cKDTree
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.errors import InputError
+from dmpcli.surfaces.coincident import distinct
+from dmpcli.surfaces.mesh_edges import Edges, corners_at
+from dmpcli.surfaces.topology import Adjacency
 
 MERGE = 1e-6
 """Points nearer than this part of the largest coordinate are one: some roundings of a float32."""
@@ -41,11 +44,13 @@ class Mended:
         component.
     remarks : list of str
         What was mended.
+    adjacency : Adjacency
     """
 
     V: Floats
     F: Integers
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[str]
+    adjacency: Adjacency
 
 
 def mended(V: Floats, F: Integers) -> Mended:
@@ -86,8 +91,10 @@ def mended(V: Floats, F: Integers) -> Mended:
         remarks.append(remark)
         if len(draft.F) == 0:
             raise InputError("no face has any area; export the part again")
+    neighbours = draft.edges.neighbours
     draft, _ = _referenced(draft)
-    return Mended(draft.V, draft.F, [remark for remark in remarks if remark])
+    adjacency = Adjacency.of(neighbours, draft.F)
+    return Mended(draft.V, draft.F, [remark for remark in remarks if remark], adjacency)
 
 
 def components(F: Integers) -> int:
@@ -109,35 +116,6 @@ def borders(F: Integers) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class _Edges:
-    """The edges of faces (m, 3).
-
-    Attributes
-    ----------
-    half : array, shape (3m, 2)
-        Directed edges; number h stands opposite corner h // m of face h % m.
-    crowded : array
-        Half edges of edges of three faces or more, those of one edge side by side.
-    border : array
-        Half edges of edges of a single face.
-    one, other : array, shape (i,)
-        The two half edges of edges between two faces.
-    """
-
-    half: Integers
-    crowded: Integers
-    border: Integers
-    one: Integers
-    other: Integers
-
-    @property
-    def at_odds(self) -> Booleans:
-        """Which edges between two faces these run along in one direction, shape (i,)."""
-        odd: Booleans = self.half[self.one, 0] == self.half[self.other, 0]
-        return odd
-
-
-@dataclass(frozen=True)
 class _Draft:
     """Vertices and faces between two steps, and the vertices of edges that were crowded."""
 
@@ -146,12 +124,14 @@ class _Draft:
     forks: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @cached_property
-    def edges(self) -> _Edges:
-        half, _, _, start, halves = igl.unique_edge_map(self.F)
-        count, start = np.diff(start), start[:-1]
-        crowded = halves[np.repeat(count > 2, count)]
-        inner = start[count == 2]
-        return _Edges(half, crowded, halves[start[count == 1]], halves[inner], halves[inner + 1])
+    def edges(self) -> Edges:
+        return Edges.of(self.F)
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Lengths of the edges opposite to the corners of each face, shape (m, 3), mm."""
+        lengths: Floats = igl.edge_lengths(self.V, self.F)
+        return lengths
 
 
 def _count(number: int, thing: str, several: str = "") -> str:
@@ -197,18 +177,14 @@ def _referenced(draft: _Draft) -> tuple[_Draft, str]:
 
 def _merged(draft: _Draft, _: float) -> tuple[_Draft, str]:
     """Make one vertex of those at exactly the same point."""
-    order = np.lexsort(draft.V.T)
-    V = draft.V[order]
-    first = np.ones(len(V), dtype=bool)
-    first[1:] = (V[1:] != V[:-1]).any(axis=1)
-    merged = len(V) - int(first.sum())
+    first, number = distinct(draft.V)
+    merged = len(draft.V) - len(first)
     if merged == 0:
         return draft, ""
-    soup = np.array_equal(draft.F.ravel(), np.arange(len(V)))  # an STL can be nothing else
-    number = np.empty(len(V), dtype=np.int64)
-    number[order] = np.cumsum(first) - 1
+    soup = np.array_equal(draft.F.ravel(), np.arange(len(draft.V)))  # as in any STL
     remark = f"{_count(merged, 'duplicate vertex', 'duplicate vertices')} merged"
-    return _Draft(V[first], number[draft.F]), "" if soup else remark
+    F = number.reshape(-1, 3) if soup else number[draft.F]
+    return _Draft(draft.V[first], F), "" if soup else remark
 
 
 def _welded(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
@@ -216,9 +192,8 @@ def _welded(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
     V, edges = draft.V, draft.edges
     border = np.unique(edges.half[edges.border])
     pairs = border[cKDTree(V[border]).query_pairs(tolerance, output_type="ndarray")]
-    # Edge k of igl's lengths stands opposite corner k, as half edges do.
     ends_apart = edges.half[:, 0] != edges.half[:, 1]
-    short = edges.half[(igl.edge_lengths(V, draft.F).T.ravel() <= tolerance) & ends_apart]
+    short = edges.half[(draft.lengths.T.ravel() <= tolerance) & ends_apart]
     joined = np.concatenate([pairs, short])
     if len(joined) == 0:
         return draft, ""
@@ -239,7 +214,7 @@ def _groups(n: int, pairs: Integers) -> tuple[int, Integers]:
 def _without_thin_faces(draft: _Draft, tolerance: float) -> tuple[_Draft, str]:
     """Leave out faces whose corners lie on a line; `_stitched` closes what they leave."""
     F = draft.F
-    thin = igl.doublearea(draft.V, F) <= tolerance * igl.edge_lengths(draft.V, F).max(axis=1)
+    thin = igl.doublearea(draft.V, F) <= tolerance * draft.lengths.max(axis=1)
     for k in range(3):
         thin |= F[:, k] == F[:, k - 1]
     gone = int(thin.sum())
@@ -398,7 +373,7 @@ def _still_joined(draft: _Draft) -> Integers:
     if len(half) == 0:
         return half
     fan = _fans(draft)
-    ends = np.stack([fan[(half // m + k) % 3 * m + half % m] for k in (1, 2)], axis=1)
+    ends = np.stack([fan[corners_at(half, k, m)] for k in (1, 2)], axis=1)
     _, of, uses = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     return half[uses[of.reshape(-1)] > 1]
 
@@ -411,8 +386,8 @@ def _fans(draft: _Draft, over_odds: bool = True) -> Integers:
     """
     F, edges, m = draft.F, draft.edges, len(draft.F)
     one, other = edges.one, edges.other
-    start, end = ((one // m + k) % 3 * m + one % m for k in (1, 2))
-    there = [(other // m + k) % 3 * m + other % m for k in (1, 2)]
+    start, end = (corners_at(one, k, m) for k in (1, 2))
+    there = [corners_at(other, k, m) for k in (1, 2)]
     odd = edges.at_odds
     pairs = np.concatenate(
         [
@@ -427,6 +402,10 @@ def _fans(draft: _Draft, over_odds: bool = True) -> Integers:
 
 def _parted(draft: _Draft, _: float) -> tuple[_Draft, str]:
     """Give every fan of faces its own vertex where sheets touch (bow-ties, crowded edges)."""
+    at = np.zeros(len(draft.V), dtype=bool)
+    at[draft.F] = True
+    if draft.edges.fans == np.count_nonzero(at):
+        return draft, ""  # one about each vertex
     draft, added = _split(draft, _fans(draft))
     ties = int((~np.isin(added, draft.forks)).sum())
     remark = f"{_count(ties, 'bow-tie')} parted: sheets that touch in one point" if ties else ""

@@ -8,7 +8,7 @@ of a wall that stands on a plate.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import dot, length
 from dmpcli.surfaces.topology import Topology, places
 
@@ -24,13 +24,14 @@ class Slits:
     V : array, shape (n, 3)
         mm.
     topology : Topology
+    place : array of int, shape (k, 2), optional
+        Of the ends of its rim, see `places`, where they are known.
     """
 
-    def __init__(self, V: Floats, topology: Topology) -> None:
-        face, edge = np.nonzero(topology.border)
-        ends = np.stack([topology.faces[face, edge], topology.faces[face, (edge + 1) % 3]], axis=1)
+    def __init__(self, V: Floats, topology: Topology, place: Integers | None = None) -> None:
+        _, ends = topology.rim
         if len(ends):
-            place = np.sort(places(V, ends), axis=1)
+            place = np.sort(places(V, ends) if place is None else place, axis=1)
             _, first, uses = np.unique(place, axis=0, return_index=True, return_counts=True)
             ends = ends[first[uses > 1]]
         self._a, self._b = V[ends[:, 0]], V[ends[:, 1]]

@@ -179,8 +179,8 @@ def _lift_alike(
         np.int64(Status.DRAWN),
     )
     sharp = _any(nodes.sharp & touched)
-    slivers, stretched = mesh.developable.slivers, mesh.developable.stretched
-    better = _any(slivers[feet.face]) & ~_any(stretched[feet.face])
+    slivers, stretched = mesh.developable_at(feet.face)
+    better = _any(slivers) & ~_any(stretched)
     return Samples(
         feet.foot,
         feet.across,
@@ -246,7 +246,7 @@ def _feet_of(
     nearest = pair, i + (r > 0.5), j + (s > 0.5)
     back = ~beyond & (dot(normal, nodes.normal[nearest])[..., 0] < 0.0)
     face = face.reshape(i.shape)
-    allowed = np.maximum(mesh.reach[face], geodesic_stepping.LANDING * nodes.away[pair, i, j])
+    allowed = np.maximum(mesh.reach_at(face), geodesic_stepping.LANDING * nodes.away[pair, i, j])
     far = ~beyond & (length(point - foot)[..., 0] > allowed)
     return _Feet(foot, across(e_v, normal), normal, face, nodes.stretch[nearest], beyond, far, back)
 

@@ -6,6 +6,36 @@ from functools import cached_property
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.surfaces.mesh_edges import pieces
+
+
+@dataclass(frozen=True)
+class Adjacency:
+    """What of a mesh of m faces is next to what, as `Topology` says it.
+
+    Attributes
+    ----------
+    neighbours : array of int, shape (m, 3)
+    components : array of int, shape (m,)
+    """
+
+    neighbours: Integers
+    components: Integers
+
+    @classmethod
+    def of(cls, neighbours: Integers, faces: Integers) -> "Adjacency":
+        """Find the components of faces (m, 3) that share an edge wherever they share a vertex."""
+        own = np.arange(len(neighbours))[:, None]
+        if pieces(np.where(neighbours < 0, own, neighbours)) == 1:
+            return cls(neighbours, np.zeros(len(faces), dtype=np.int64))
+        return cls(neighbours, _by_vertices(faces))
+
+
+def _by_vertices(faces: Integers) -> Integers:
+    import igl
+
+    parts: Integers = igl.vertex_components(faces)[faces[:, 0]]
+    return parts
 
 
 @dataclass(frozen=True)
@@ -24,6 +54,16 @@ class Topology:
 
     faces: Integers
     vertices: int
+
+    def know(self, adjacency: Adjacency) -> None:
+        """Take what was found before for what would be found here."""
+        # As cached properties keep what they found.
+        vars(self).update(neighbours=adjacency.neighbours, components=adjacency.components)
+
+    @property
+    def adjacency(self) -> Adjacency:
+        """What `know` takes."""
+        return Adjacency(self.neighbours, self.components)
 
     @cached_property
     def _edges(self) -> tuple[Integers, Integers]:
@@ -63,19 +103,21 @@ class Topology:
     def border_vertices(self) -> Booleans:
         """Vertices at the end of a border edge, shape (vertices,)."""
         marked = np.zeros(self.vertices, dtype=bool)
-        marked[self.faces[self.border]] = True
-        marked[np.roll(self.faces, -1, axis=1)[self.border]] = True
+        marked[self.rim[1]] = True
         return marked
 
     @cached_property
     def components(self) -> Integers:
         """Number of the connected component of each face, shape (m,); vertices connect."""
-        import igl
+        return _by_vertices(self.faces)
 
-        parts: Integers = igl.vertex_components(self.faces)[self.faces[:, 0]]
-        return parts
+    @cached_property
+    def rim(self) -> tuple[Integers, Integers]:
+        """Faces (k,) of the border edges, and the vertices (k, 2) that these run from and to."""
+        face, edge = np.nonzero(self.border)
+        return face, np.stack([self.faces[face, edge], self.faces[face, (edge + 1) % 3]], axis=1)
 
-    def closed(self, V: Floats) -> Booleans:
+    def closed(self, V: Floats, place: Integers | None = None) -> Booleans:
         """Tell which components, shape (components,), have no border but where they touch.
 
         A border that lies on another of the same component, run along the other way, is a cut
@@ -84,14 +126,17 @@ class Topology:
         Parameters
         ----------
         V : array, shape (vertices, 3)
+        place : array of int, shape (k, 2), optional
+            Of the ends of the rim, see `places`, where they are known.
         """
         count = int(self.components.max(initial=-1)) + 1
-        closed = np.bincount(self.components, (self.neighbours == -2).any(axis=1), count) == 0
-        face, edge = np.nonzero(self.border)
+        closed = np.ones(count, dtype=bool)
+        if self.neighbours.min(initial=0) == -2:
+            closed[self.components[(self.neighbours == -2).any(axis=1)]] = False
+        face, ends = self.rim
         if len(face) == 0:
-            return np.asarray(closed)
-        ends = np.stack([self.faces[face, edge], self.faces[face, (edge + 1) % 3]], axis=1)
-        place = places(V, ends)
+            return closed
+        place = places(V, ends) if place is None else place
         part = self.components[face]
         # Each edge leads away from its start as often as another comes back to it.
         way = np.where(place[:, 0] < place[:, 1], 1, -1)
@@ -99,7 +144,7 @@ class Topology:
         groups, of = np.unique(keys, axis=0, return_inverse=True)
         left = np.bincount(of.reshape(-1), way, len(groups))
         closed[groups[left != 0, 0]] = False
-        return np.asarray(closed)
+        return closed
 
 
 def places(V: Floats, ends: Integers) -> Integers:

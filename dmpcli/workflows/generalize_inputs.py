@@ -96,11 +96,18 @@ def where_instead(
 
 
 def facing_tool(surface: "Surface", skill: "Skill", table: "PairTable", name: str) -> "Surface":
-    """Turn a plane's normal to the tool's side, and say so where that flips it."""
-    from dmpcli.dmp.feasibility import tool_axis
+    """Turn a plane's normal to the tool's side, and say so where that flips it.
+
+    A mesh learns where it will be asked for its shape.
+    """
+    from dmpcli.dmp.feasibility import sideways, tool_axis
     from dmpcli.messages import tell
+    from dmpcli.surfaces.mesh import Mesh
     from dmpcli.surfaces.plane import Plane
 
+    if isinstance(surface, Mesh) and skill.model == "modified":
+        pairs = table.pairs[table.good.nonzero()[0]]
+        surface.expect(pairs.start, pairs.goal, sideways(skill))
     if not isinstance(surface, Plane):
         return surface  # other charts look for the tool's side at each start
     facing = surface.facing(tool_axis(skill, table.pairs[table.good.nonzero()[0]]))

@@ -6,6 +6,7 @@ where its pairs are drawn, and what stands against it, or against pairs on it, i
 
 import os
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from dmpcli.dmp.drawn_strokes import OnBorder
 from dmpcli.dmp.feasibility import admit, snapped
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.sides import turned_over
+from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.messages import heard, warn
@@ -281,6 +283,11 @@ class SiteWork:
     reach: Reach | None
     reader: SurfaceReader
 
+    @cached_property
+    def plain(self) -> Skill:
+        """The skill that is drawn, one for all sites: what it has found once it knows."""
+        return self.skill.plain()
+
     def __call__(
         self, site: Site, ids: list[str], pairs: Pairs, duration: Floats
     ) -> tuple[PreparedSite, list[Remark]]:
@@ -314,7 +321,7 @@ class SiteWork:
         good = np.flatnonzero(verdict.admitted)
         start, goal = on.start.copy(), on.goal.copy()
         start[good], goal[good] = ends(skill, on[good], given, style.turn)
-        task = Task(skill.plain(), given, style, self.reach, asked(settings.event or ()))
+        task = Task(self.plain, given, style, self.reach, asked(settings.event or ()))
         return (
             PreparedSite(
                 task,

@@ -43,7 +43,7 @@ def area(V, F):
 
 def assert_sound(found, like=None, rtol=1e-9):
     """Every promise of a mesh file, judged by libigl and trimesh."""
-    V, F, _ = found
+    V, F = found.V, found.F
     assert np.isfinite(V).all()
     assert F.min() == 0
     assert np.array_equal(np.unique(F), np.arange(len(V)))

@@ -49,7 +49,7 @@ class Judge:
     def patches(self):
         """Number of the smooth patch of each face: joined by edges of less than `SMOOTH`."""
         neighbours = self.mesh.topology.neighbours
-        face, edge = np.nonzero((neighbours >= 0) & (self.mesh.dihedrals < SMOOTH))
+        face, edge = np.nonzero((neighbours >= 0) & (self.mesh.shape.dihedrals < SMOOTH))
         joined = coo_array(
             (np.ones(len(face)), (face, neighbours[face, edge])), shape=2 * (len(neighbours),)
         )

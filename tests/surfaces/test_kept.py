@@ -119,15 +119,15 @@ def what_meshes_say_of_themselves():
     found: list = []
     for mesh in meshes().values():
         found += [
-            mesh.parts,
-            mesh.noisy_share,
-            mesh.dihedrals,
-            mesh.developable,
+            varied.parts_of(mesh),
+            mesh.shape.noisy_share,
+            mesh.shape.dihedrals,
+            mesh.shape.developable,
             mesh.outward,
-            mesh.edge_length,
-            mesh.chordal_error,
-            mesh.reach,
-            mesh.planes,
+            mesh.shape.edge_length,
+            mesh.shape.chordal_error,
+            mesh.shape.reach,
+            mesh.planes_at(np.arange(len(mesh.F))),
         ]
         topology = Topology(mesh.F, len(mesh.V))
         found += [topology.uses, topology.border, topology.closed(mesh.V), topology.border_vertices]
@@ -220,7 +220,7 @@ def strokes_laid_on_machined_parts():
         charts = mesh.charts(start, goal)
         lift = charts.lift(wavy(charts, 3.0))
         found += [
-            mesh.noise,
+            mesh.shape.noise,
             charts.lengths,
             charts.status,
             charts.goals,

@@ -91,12 +91,14 @@ def cone(half_angle, sides=40, size=60.0):
 
 def test_normals_at_the_tip_of_a_cone_are_those_of_its_facets():
     for mesh in (cone(80.0), cone(50.0)):
-        lean = np.sum(mesh.corner_normals * mesh.face_normals[:, None], axis=-1)
+        lean = np.sum(mesh.shape.corner_normals * mesh.face_normals[:, None], axis=-1)
         assert lean.min() >= np.cos(np.radians(11.0))
-    np.testing.assert_allclose(mesh.corner_normals[:, 0], mesh.face_normals, atol=1e-12)
+    np.testing.assert_allclose(mesh.shape.corner_normals[:, 0], mesh.face_normals, atol=1e-12)
     # Facets so coarse that the tip could be a rounded one.
     coarse = cone(50.0, 12)
-    lean = np.degrees(np.arccos(np.sum(coarse.corner_normals * coarse.face_normals[:, None], -1)))
+    lean = np.degrees(
+        np.arccos(np.sum(coarse.shape.corner_normals * coarse.face_normals[:, None], -1))
+    )
     assert lean.max() == pytest.approx(14.9)
 
 

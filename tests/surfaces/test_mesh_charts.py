@@ -148,7 +148,7 @@ def test_folds_are_drawn_as_on_the_flat_sheet(degrees, cells):
     assert (lift.status == Status.DRAWN).all()
     off = np.linalg.norm(lift.position - over(sheet), axis=-1).max()
     if degrees < 25.0:
-        assert off < mesh.chordal_error
+        assert off < mesh.shape.chordal_error
         return
     assert lift.unfolded.all()
     assert off < 1e-6
@@ -230,8 +230,8 @@ def test_slivers_of_a_surface_curved_both_ways_are_not_unfolded():
         return 150.0 * np.stack([x, y, z - 1.0], axis=-1)
 
     mesh = Mesh(*fields.grid(ball, 200, 20, (-0.6, 0.6), (-0.6, 0.6)))
-    assert not mesh.developable.slivers.any()
-    assert mesh.developable.stretched.mean() > 0.9
+    assert not mesh.shape.developable.slivers.any()
+    assert mesh.shape.developable.stretched.mean() > 0.9
 
 
 def noisy(mesh, sigma):
@@ -244,11 +244,11 @@ def noisy(mesh, sigma):
 @pytest.mark.parametrize("sigma", [0.05, 0.1])
 def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma):
     smooth, case = cases.mesh(name, 35_000), cases.case(name, 12, 300)
-    assert not smooth.noise.any()
+    assert not smooth.shape.noise.any()
     mesh = noisy(smooth, sigma)  # edges of 1.5 mm: facets meet at up to 50°
-    rough = mesh.noise > 0.0
+    rough = mesh.shape.noise > 0.0
     assert rough.mean() > 0.6
-    assert np.median(mesh.noise[rough]) == pytest.approx(sigma, rel=0.2)
+    assert np.median(mesh.shape.noise[rough]) == pytest.approx(sigma, rel=0.2)
     _, lift = cases.drawn(mesh, case)
     assert (lift.status == Status.DRAWN).all()
     assert not lift.unfolded.any()

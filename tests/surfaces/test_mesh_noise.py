@@ -23,7 +23,7 @@ def part(name):
 
 def half_noisy(mesh, by_edge):
     """Noise of so much of an edge on the vertices of x > 0."""
-    shift = by_edge * mesh.edge_length * np.random.default_rng(1).normal(size=mesh.V.shape)
+    shift = by_edge * mesh.shape.edge_length * np.random.default_rng(1).normal(size=mesh.V.shape)
     return Mesh(mesh.V + np.where(mesh.V[:, :1] > 0.0, shift, 0.0), mesh.F)
 
 
@@ -31,19 +31,19 @@ def share(mesh, faces):
     """Share of the area of some faces that is noisy."""
     a, b, c = np.moveaxis(mesh.corners[faces], 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return area[mesh.noise[faces] > 0.0].sum() / area.sum()
+    return area[mesh.shape.noise[faces] > 0.0].sum() / area.sum()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("faces", [5_000, 50_000])
 def test_smooth_surfaces_are_not_noisy_anywhere(name, faces):
-    assert not cases.mesh(name, faces).noise.any()
+    assert not cases.mesh(name, faces).shape.noise.any()
 
 
 @pytest.mark.parametrize("name", ["angle_block", "carriage"])
 def test_the_slivers_of_machined_parts_are_not_noise(name):
-    assert part(name).noisy_share <= 0.001
+    assert part(name).shape.noisy_share <= 0.001
 
 
 @pytest.mark.parametrize("name", cases.SURFACES)
@@ -54,16 +54,16 @@ def test_noise_on_half_of_a_mesh_is_found_in_that_half(name, by_edge):
     noisy = mesh.V[mesh.F][..., 0].mean(axis=1) > 0.0
     assert share(mesh, noisy) >= 0.6
     assert share(mesh, ~noisy) <= 0.05
-    sigma = np.median(mesh.noise[mesh.noise > 0.0])
-    assert sigma == pytest.approx(by_edge * smooth.edge_length, rel=0.35)
+    sigma = np.median(mesh.shape.noise[mesh.shape.noise > 0.0])
+    assert sigma == pytest.approx(by_edge * smooth.shape.edge_length, rel=0.35)
 
 
 def test_normals_far_from_noise_are_those_without_it():
     smooth = cases.mesh("saddle", 5_000)
     mesh = half_noisy(smooth, 0.07)
     far = mesh.V[mesh.F][..., 0].max(axis=1) < -30.0
-    np.testing.assert_array_equal(mesh.corner_normals[far], smooth.corner_normals[far])
-    np.testing.assert_array_equal(mesh.reach[far], smooth.reach[far])
+    np.testing.assert_array_equal(mesh.shape.corner_normals[far], smooth.shape.corner_normals[far])
+    np.testing.assert_array_equal(mesh.shape.reach[far], smooth.shape.reach[far])
 
 
 def test_a_crease_far_from_noise_is_drawn_and_one_within_it_refused():
@@ -114,7 +114,7 @@ def test_the_reach_beside_a_chamfer_is_not_that_of_its_turn_over_a_long_facet():
     profile = np.vstack([profile, profile[-1] + 100.0 * np.array([np.cos(2 * a), -np.sin(2 * a)])])
     V = np.concatenate([[[x, y, z] for y in (-50.0, 50.0)] for x, z in profile])
     F = np.array([t for k in (0, 2, 4) for t in ((k, k + 2, k + 1), (k + 1, k + 2, k + 3))])
-    assert Mesh(V, F).reach.max() <= 1.0
+    assert Mesh(V, F).shape.reach.max() <= 1.0
 
 
 def test_the_load_line_tells_how_much_is_noisy():
@@ -122,4 +122,4 @@ def test_the_load_line_tells_how_much_is_noisy():
     assert "noisy" not in summary(MeshFile(smooth.V, smooth.F, []))
     mesh = half_noisy(smooth, 0.07)
     told = summary(MeshFile(mesh.V, mesh.F, []), mesh)
-    assert f"{100 * mesh.noisy_share:.2g} % of its area is noisy" in told
+    assert f"{100 * mesh.shape.noisy_share:.2g} % of its area is noisy" in told

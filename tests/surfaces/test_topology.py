@@ -94,10 +94,11 @@ def test_sizes_angles_and_sides_of_a_mesh_are_trimeshs():
     V, F = open_part()
     mesh, theirs = TriangleMesh(V, F), trimesh.Trimesh(V, F, process=False)
     assert mesh.face_normals == pytest.approx(theirs.face_normals, abs=1e-9)
-    planes = np.einsum("mj,mkj->mk", mesh.planes[:, :3], V[F]) - mesh.planes[:, 3:]
+    plane = mesh.planes_at(np.arange(len(F)))
+    planes = np.einsum("mj,mkj->mk", plane[:, :3], V[F]) - plane[:, 3:]
     assert np.abs(planes).max() < 1e-9
     lengths = np.linalg.norm(np.diff(V[F][:, [0, 1, 2, 0]], axis=1), axis=2)
-    assert mesh.edge_length == pytest.approx(lengths.mean())
+    assert mesh.shape.edge_length == pytest.approx(lengths.mean())
     between = dict(
         zip(
             map(frozenset, theirs.face_adjacency_edges.tolist()),
@@ -107,10 +108,10 @@ def test_sizes_angles_and_sides_of_a_mesh_are_trimeshs():
     )
     for i, k in itertools.product(range(0, len(F), 7), range(3)):
         edge = frozenset((int(F[i, k]), int(F[i, (k + 1) % 3])))
-        assert mesh.dihedrals[i, k] == pytest.approx(between.get(edge, 0.0), abs=1e-5)
+        assert mesh.shape.dihedrals[i, k] == pytest.approx(between.get(edge, 0.0), abs=1e-5)
     assert mesh.outward.tolist() == [0.0, 1.0]
     assert TriangleMesh(V, F[:, ::-1]).outward.tolist() == [0.0, -1.0]
-    assert mesh.noisy_share == 0.0
+    assert mesh.shape.noisy_share == 0.0
 
 
 def test_closest_points_and_their_faces_are_trimeshs_for_any_shape_of_points():
@@ -134,9 +135,10 @@ def test_closest_points_and_their_faces_are_trimeshs_for_any_shape_of_points():
 def test_a_strokes_course_may_lie_off_a_face_by_five_times_the_chordal_error_about_it():
     V, F = np.array(BALL.vertices), np.array(BALL.faces)
     mesh = TriangleMesh(V, F)
-    assert (mesh.reach >= 5.0 * mesh._heights - 1e-12).all()
+    assert (mesh.shape.reach >= 5.0 * mesh.shape.heights - 1e-12).all()
+    heights = mesh.shape.heights
     touching = [
-        max(mesh._heights[j] for j in range(len(F)) if set(F[i]) & set(F[j])) for i in (0, 77, 200)
+        max(heights[j] for j in range(len(F)) if set(F[i]) & set(F[j])) for i in (0, 77, 200)
     ]
-    assert mesh.reach[[0, 77, 200]] == pytest.approx(5.0 * np.array(touching))
-    assert mesh.chordal_error == mesh._heights.max()
+    assert mesh.shape.reach[[0, 77, 200]] == pytest.approx(5.0 * np.array(touching))
+    assert mesh.shape.chordal_error == mesh.shape.heights.max()

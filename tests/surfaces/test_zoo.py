@@ -43,7 +43,7 @@ def test_the_zoo_is_as_large_as_it_is_meant_to_be():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", zoo.PARTS)
 def test_no_part_is_taken_for_a_noisy_scan(name):
-    assert zoo.mesh(name).noisy_share <= 0.001
+    assert zoo.mesh(name).shape.noisy_share <= 0.001
 
 
 @pytest.mark.slow

@@ -193,6 +193,14 @@ def right(lift):
 # Strips.
 
 
+def parts_of(mesh):
+    """What of a mesh is costly to find."""
+    topology, shape = mesh.topology, mesh.shape
+    found = {"neighbours": topology.neighbours, "components": topology.components}
+    names = ("corner_normals", "noise", "heights")
+    return found | {name: getattr(shape, name) for name in names}
+
+
 @case
 def slopes_and_cells_of_grids():
     rng = np.random.default_rng(3)
@@ -630,18 +638,23 @@ def scans_smooth_and_rough():
         shift = sigma * np.random.default_rng(22).normal(size=V.shape) * (V[:, :1] > 0.0)
         for faces in (F, F[::-1].copy(), np.roll(F, 1, axis=1)):
             mesh = Mesh(V + shift, faces)
-            found += [mesh.noise, mesh.noisy_share, mesh.reach, mesh.corner_normals]
-        found += [mesh_noise.averaged(mesh._vertex_normals, mesh.F)]
+            found += [
+                mesh.shape.noise,
+                mesh.shape.noisy_share,
+                mesh.shape.reach,
+                mesh.shape.corner_normals,
+            ]
+        found += [mesh_noise.averaged(mesh.shape.vertex_normals, mesh.F)]
     return found
 
 
 @case
 def noise_at_its_limits():
     mesh = meshes()["rough"]
-    of = mesh.corners, mesh.face_normals, mesh._vertex_normals
+    of = mesh.corners, mesh.face_normals, mesh.shape.vertex_normals
     found: list = []
     for share in (0.02, 0.3, 0.6, 1.0, 1.6):
-        found += [noise(*of, share * mesh.dihedrals, mesh.topology)]
+        found += [noise(*of, share * mesh.shape.dihedrals, mesh.topology)]
     rings_ = mesh_noise._Rings(np.linspace(1.0, 2.0, len(mesh.F)), mesh.topology)
     values = np.column_stack([np.arange(len(mesh.F)), np.ones(len(mesh.F))])
     return [*found, *(rings_.means(values, n) for n in (0, 1, 3))]
@@ -887,10 +900,25 @@ def what_small_meshes_say_of_themselves():
         points = scattered(mesh, 25, 40, 4.0).reshape(5, 5, 3)
         at = mesh.closest(points)
         flat, face = at.position.reshape(-1, 3), at.face.reshape(-1)
-        found += [name, mesh.dihedrals, mesh.developable, mesh.outward, mesh.edge_length]
-        found += [mesh.chordal_error, mesh.reach, mesh.planes, mesh.parts, at]
+        found += [
+            name,
+            mesh.shape.dihedrals,
+            mesh.shape.developable,
+            mesh.outward,
+            mesh.shape.edge_length,
+        ]
+        found += [
+            mesh.shape.chordal_error,
+            mesh.shape.reach,
+            mesh.planes_at(np.arange(len(mesh.F))),
+            parts_of(mesh),
+            at,
+        ]
         found += [mesh.beyond_border(points.reshape(-1, 3), flat, face)]
-        found += [mesh._tips(mesh.corner_normals), mesh._ends(mesh.dihedrals > 10.0)]
+        found += [
+            mesh.shape._tips(mesh.shape.corner_normals),
+            mesh.shape._ends(mesh.shape.dihedrals > 10.0),
+        ]
         found += [
             mesh.slits.off(flat),
             placement.box(mesh),
@@ -898,8 +926,8 @@ def what_small_meshes_say_of_themselves():
         ]
         found += [chordal_error.chordal_error(mesh.V, mesh.F), extent.area(mesh.V, mesh.F)]
         found += [extent.volume(mesh.V, mesh.F), mesh.topology.border_vertices]
-        other = type(mesh).with_parts(mesh.V, mesh.F, mesh.parts)
-        found += [other.noise, other.components, other.corner_normals]
+        other = type(mesh)(mesh.V, mesh.F, mesh.topology.adjacency)
+        found += [other.shape.noise, other.components, other.shape.corner_normals]
     return found
 
 
