@@ -60,7 +60,7 @@ def _load_on_meshes() -> None:
     v, one, two = np.zeros((1, 1, 3)), np.ones((1, 1)), np.zeros(2)
     none = np.zeros(1, dtype=np.int64)
     limits = inverse.FootLimits(1, 1.0)
-    inverse.feet(mesh.facets, v, one, limits, v, v, one, np.zeros(1, dtype=bool))
+    inverse.feet(mesh.facets, v, one, limits, v, v, one, np.zeros((1, 1), dtype=bool))
     at = inverse.guesses(v, v, v, none, none, 0, one[0], v)
     inverse.extents(at)
     step, nodes = np.ones((1, 2)), np.zeros((1, 2, 2, 12))

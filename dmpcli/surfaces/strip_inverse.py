@@ -106,15 +106,16 @@ def _feet(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]
     from dmpcli.surfaces.kernels import inverse
 
     foot, facet = np.empty((2, *position.shape))
-    height, doubt = np.empty(position.shape[:2]), np.empty(len(position), dtype=bool)
+    height, doubt = np.empty(position.shape[:2]), np.empty(position.shape[:2], dtype=bool)
     limits = inverse.FootLimits(_FEET, _ON_FOOT)
     position = np.ascontiguousarray(position)
     sign = charts.centre.sign
     inverse.feet(charts.mesh.facets, position, sign, limits, foot, facet, height, doubt)
-    rows = np.flatnonzero(doubt)
-    if len(rows):
-        some = _feet_sought(charts.rows(rows), position[rows])
-        foot[rows], facet[rows], height[rows] = some
+    row, sample = np.nonzero(doubt)
+    if len(row):
+        some = _feet_sought(charts.rows(row), position[row, sample, None])
+        for values, sought in zip((foot, facet, height), some, strict=True):
+            values[row, sample] = sought[:, 0]
     return foot, facet, height
 
 

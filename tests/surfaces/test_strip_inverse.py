@@ -127,14 +127,16 @@ def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkey
 @pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
 @pytest.mark.parametrize("wide", [0.0, 4.0, 25.0])
 def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
-    for mesh, half, top in ((bumpy, 54.0, 5.0), (ball, 40.0, 100.0)):
+    coarse = cases.mesh("bumpy", 1_500)
+    for mesh, half, top in ((bumpy, 54.0, 5.0), (ball, 40.0, 100.0), (coarse, 54.0, 5.0)):
         charts = laid(mesh.with_kernels, half=half, top=top)
         wanted = wave(charts, wide=wide, height=height)
         drawn = charts.lift(wanted)
         found = strip_inverse.found(charts, drawn.position)
         pure = strip_inverse.found(laid(mesh, half=half, top=top), drawn.position)
         assert found.rows.tolist() == pure.rows.tolist()
-        np.testing.assert_allclose(found.coordinates, wanted[found.rows], atol=2e-6)
+        if mesh is not coarse:  # over its edges several coordinates lead to one foot
+            np.testing.assert_allclose(found.coordinates, wanted[found.rows], atol=2e-6)
         np.testing.assert_allclose(found.coordinates, pure.coordinates, atol=2e-8)
         np.testing.assert_allclose(found.axes, pure.axes, atol=1e-7)
         assert found.miss.max(initial=0.0) <= 1e-6

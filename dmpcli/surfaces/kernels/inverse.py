@@ -12,10 +12,12 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.samples import followed
 from dmpcli.surfaces.kernels.tree import (
+    EDGES,
     Facets,
     closest,
     flat_normal,
     in_doubt,
+    outward_of,
     smooth_normal,
     stack,
 )
@@ -27,6 +29,9 @@ from dmpcli.surfaces.kernels.vectors import (
     sub,
     times,
 )
+
+_ON_EDGE = 1e-9
+"""A foot this near to an edge of its facet may as well lie on the next one, mm."""
 
 _SEEDED = 5.0
 """Where the neighbour leads no farther than this from a guess it is begun there, mm."""
@@ -72,6 +77,15 @@ def closest_along(
 
 
 @kernel
+def _on_edge(reals: Floats, foot: Vector, row: int) -> bool:
+    """Tell whether a point of a facet lies on an edge of it."""
+    for k in range(3):
+        if dot(outward_of(reals, row, k), foot) - reals[row, EDGES + 9 + k] > -_ON_EDGE:
+            return True
+    return False
+
+
+@kernel
 def feet(
     facets: Facets,
     points: Floats,
@@ -84,21 +98,21 @@ def feet(
 ) -> None:
     """Fill in feet (B, T, 3) by the smooth normal, normals of their facets, and heights (B, T).
 
-    Feet that are not found are no numbers. Strokes with `doubt`, (B,), are for numpy.
+    Feet that are not found are no numbers. Samples with `doubt`, (B, T), are for numpy: those whose
+    feet lie on an edge, where it matters which of its facets is named.
     """
     nodes, offs = stack()
     for b in range(len(points)):
         row = -1
-        doubt[b] = False
         for k in range(points.shape[1]):
             p = points[b, k, 0], points[b, k, 1], points[b, k, 2]
-            below, up = p, 0.0
+            below, up, unsure = p, 0.0, False
             for step in range(limits.most):
                 if row < 0:
                     q, row = closest(facets, below, nodes, offs)
                 else:
                     q, row = followed(facets, below, row, nodes, offs)
-                doubt[b] |= in_doubt(facets, below, q, row)
+                unsure |= _on_edge(facets.reals, q, row) or in_doubt(facets, below, q, row)
                 n = times(sign[b, 0], smooth_normal(facets.reals, q, row))
                 up = dot(sub(p, q), n)
                 below = sub(p, times(up, n))
@@ -106,7 +120,7 @@ def feet(
                     break
                 if step == limits.most - 1:
                     q = (np.nan, np.nan, np.nan)
-            height[b, k] = up
+            height[b, k], doubt[b, k] = up, unsure
             foot[b, k, 0], foot[b, k, 1], foot[b, k, 2] = q
             facet[b, k, 0], facet[b, k, 1], facet[b, k, 2] = flat_normal(facets.reals, row)
 
