@@ -64,7 +64,7 @@ setup: $(VENV)/installed
 # Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
 # what they share is made once. Lint and types are looked at meanwhile: some tests wait in real time,
 # and mypy is one process. For the same reason there are two processes to a core, and of the quick
-# half, which waits little, three to two: each works for 13 s before its first test. WORKERS=N chooses.
+# half, which waits little, three to two: each works for 8 s before its first test. WORKERS=N chooses.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --dist loadfile --no-loadscope-reorder
