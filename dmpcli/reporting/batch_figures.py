@@ -40,15 +40,17 @@ def distributions(many: MeasuredBatch) -> Figure | None:
 
     A line marks the demonstration's wave height; the band holds 90 % of the strokes.
     """
-    found = {name: many.values(name) for name in TITLES}
-    found = {name: v[np.isfinite(v)] for name, v in found.items() if np.isfinite(v).any()}
+    # One figure is held at a time: there may be millions of strokes.
+    found = [name for name in TITLES if np.isfinite(many.values(name)).any()]
     if not found:
         return None
     rows = -(-len(found) // 2)
     figure = drawing.page(
         2 * (_ACROSS + _WIDTH) + _RIGHT, rows * (_UP + _HEIGHT) + _TOP + drawing.ROW
     )
-    for i, (name, values) in enumerate(found.items()):
+    for i, name in enumerate(found):
+        values = many.values(name)
+        values = values[np.isfinite(values)]
         bottom = (rows - 1 - i // 2) * (_UP + _HEIGHT) + _UP
         left = _ACROSS + (i % 2) * (_ACROSS + _WIDTH)
         axes = drawing.panel(figure, left, bottom, _WIDTH, _HEIGHT)
