@@ -142,7 +142,7 @@ def test_an_independent_solver_of_the_whole_nonlinear_model_agrees(seed):
 
 @pytest.mark.slow
 def test_the_standard_errors_are_those_of_many_repetitions():
-    found = [identify(tilted(), noisy(tilted(), seed)) for seed in range(100)]
+    found = [identify(tilted(), noisy(tilted(), seed)) for seed in range(200)]
     for name in ("weight", "centre", "inclination", "zero"):
         values = np.array([np.ravel(getattr(f.payload, name)) for f in found])
         said = np.array([np.ravel(getattr(f.error, name)) for f in found])

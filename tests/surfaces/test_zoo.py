@@ -48,4 +48,4 @@ def test_no_part_is_taken_for_a_noisy_scan(name):
 
 @pytest.mark.slow
 def test_strokes_on_parts_are_drawn_right_or_refused_for_what_the_tracer_meets_too():
-    check([judged(name, 8, 2) for name in zoo.PARTS])
+    check([judged(name, 12, 2) for name in zoo.PARTS])
