@@ -62,3 +62,22 @@ def _covers(comment, number):
         if int(first) <= number <= int(last or first):
             return True
     return False
+
+
+def test_the_readme_names_for_each_equation_what_the_page_names():
+    readme = (ROOT / "README.md").read_text()
+    told = re.search(r"Where they are computed.*?\n\n", readme, re.DOTALL)[0].partition(":")[2]
+    named = []
+    for part in told.split(";"):
+        file, *names = re.findall(r"`([^`]+)`", part)
+        numbers = [int(number) for number in re.findall(r"\((\d+)\)", part.partition("`")[0])]
+        named += numbers
+        for name in names:
+            page = " ".join(e for e, f, n in ROWS if (f"dmpcli/{f}", n) == (file, name))
+            assert page, (file, name)
+            comments = " ".join(
+                line.partition("#")[2] for line in source_of(file.removeprefix("dmpcli/"), name)
+            )
+            assert all(_covers(comments, number) for number in numbers), part
+            assert "alpha_f" not in part or "alpha_f" in comments
+    assert named == [1, 3, 4, 5, 6, 7, 8, 9, 10]

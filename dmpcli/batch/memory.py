@@ -9,22 +9,12 @@ import ctypes
 
 # Of glibc's malloc.h.
 _TRIM_THRESHOLD, _MMAP_MAX = -1, -4
-_DEFAULT_TRIM, _DEFAULT_MMAPS = 1 << 17, 1 << 16
 _MOST = (1 << 31) - 1
 
 
 def keep() -> None:
     """Keep what is freed for the next part; does nothing where the C library is another one."""
-    _set(_MOST, 0)
-
-
-def give_back() -> None:
-    """Return to the C library's own ways."""
-    _set(_DEFAULT_TRIM, _DEFAULT_MMAPS)
-
-
-def _set(trim: int, mmaps: int) -> None:
     with contextlib.suppress(OSError, AttributeError, TypeError):
         library = ctypes.CDLL(None)
-        library.mallopt(_TRIM_THRESHOLD, trim)
-        library.mallopt(_MMAP_MAX, mmaps)
+        library.mallopt(_TRIM_THRESHOLD, _MOST)
+        library.mallopt(_MMAP_MAX, 0)

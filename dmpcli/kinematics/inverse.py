@@ -65,10 +65,12 @@ def _geometry(arm: Arm) -> _Geometry:
     return _Geometry(d1, d4, d5, d6, float(arm.a[1]), float(arm.a[2]), s1, s4, s5)
 
 
-def solutions(arm: Arm, position: Floats, rotation: Floats) -> Floats:
+def solve(
+    arm: Arm, position: Floats, rotation: Floats, sixth: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Every set of joint angles that brings the flange to a pose.
 
-    Joint limits are not looked at. Where axes 4 and 6 are in line joint 6 is put to zero.
+    Joint limits are not looked at.
 
     Parameters
     ----------
@@ -76,33 +78,13 @@ def solutions(arm: Arm, position: Floats, rotation: Floats) -> Floats:
     position : array, shape (..., 3)
         Of the flange in the base frame, mm.
     rotation : array, shape (..., 3, 3)
-
-    Returns
-    -------
-    array, shape (..., 8, 6)
-        rad, in (-π, π]; NaN where a branch does not reach the pose.
-    """
-    return solve(arm, position, rotation)[0]
-
-
-def solve(
-    arm: Arm, position: Floats, rotation: Floats, sixth: Floats | None = None
-) -> tuple[Floats, Floats]:
-    """`solutions`, and how far each branch is from reaching the pose.
-
-    Parameters
-    ----------
-    arm : Arm
-    position : array, shape (..., 3)
-        mm.
-    rotation : array, shape (..., 3, 3)
     sixth : array, shape (..., 8), optional
         Angle of joint 6 in each branch where axes 4 and 6 are in line, rad; 0 if not given.
 
     Returns
     -------
     q : array, shape (..., 8, 6)
-        rad.
+        rad, in (-π, π]; NaN where a branch does not reach the pose.
     missing : array, shape (..., 8)
         By how much the arm is too short, or cannot fold, for the pose, mm; 0 where it reaches.
     """

@@ -157,12 +157,6 @@ def _crossings(t: Floats, height: Floats | None, up: bool) -> list[float]:
     return [float(when) for when in t[at] + share * (t[at + 1] - t[at])]
 
 
-def left_on(events: Sequence[OutputEvent]) -> list[str]:
-    """Names of the outputs that are on when the last event is over."""
-    state = {event.output: event.on for event in events}
-    return [name for name, on in state.items() if on]
-
-
 def stored(events: Sequence[OutputEvent], t: Floats) -> list[str | None]:
     """Return the column of a file, one text a row: what is switched from there to the next row.
 

@@ -62,7 +62,7 @@ def test_through_the_wrist_singularity_the_branch_that_goes_on_is_taken(samples)
     assert not found.jumps.any()
     assert found.joints[0] == pytest.approx(q, abs=0.01)
     # The branch of the start's number would jump by about half a turn there.
-    numbered = inverse.solutions(EC66, *chain.forward(EC66, q))
+    numbered = inverse.solve(EC66, *chain.forward(EC66, q))[0]
     apart = np.abs((numbered[0] - before + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
     own = np.unwrap(numbered[:, np.nanargmin(apart)], axis=0)
     assert np.nanmax(np.abs(np.diff(own, axis=0))) > 1.0
@@ -117,7 +117,7 @@ def test_another_branch_is_found_where_the_one_of_the_start_leaves_the_limits():
 def test_the_branch_that_is_taken_has_the_largest_margin_of_all_eight():
     q = swept(PLAIN, PLAIN + [0.2, 0.1, -0.1, 0.1, 0.1, 0.1])
     free = followed(q)
-    starts = inverse.solutions(EC66, *chain.forward(EC66, q[0]))
+    starts = inverse.solve(EC66, *chain.forward(EC66, q[0]))[0]
     margins = [followed(q, s).margin[0] for s in starts if not np.isnan(s[0])]
     assert np.isfinite(margins).sum() >= 4
     assert free.margin[0] >= np.nanmax(margins) - 1e-9

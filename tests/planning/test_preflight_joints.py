@@ -83,7 +83,7 @@ def _turn(angle):
 def test_the_arm_begins_where_its_joints_are():
     source = stroke()
     made = plan(source)
-    for first in inverse.solutions(EC66, source.position[0], PEN_DOWN):
+    for first in inverse.solve(EC66, source.position[0], PEN_DOWN)[0]:
         if np.isnan(first).any():
             continue
         first[5] += 2 * np.pi * (first[5] < 0)  # another turn than the best one, sometimes
@@ -93,7 +93,7 @@ def test_the_arm_begins_where_its_joints_are():
 
 def test_a_joint_near_its_limit_where_the_arm_stands_is_refused_though_another_turn_would_do():
     source = stroke(turn=1.5)
-    first = inverse.solutions(EC66, source.position[0], source.rotation[0])[0]
+    first = inverse.solve(EC66, source.position[0], source.rotation[0])[0][0]
     end = 0.2  # rad before the limit, on the side that the stroke turns to
     _, after = preflight.by_joints(plan(source), source, REACH, first)
     side = np.sign(after[5] - first[5])
