@@ -69,7 +69,7 @@ def counted(number: int, what: str) -> str:
 
 @contextlib.contextmanager
 def about(name: str, kind: type[DmpError] = DmpError) -> Iterator[None]:
-    """Put a file's name before the messages of errors that mathematics raises about it.
+    """Put a file's name before the messages of errors that mathematics raises about it, once.
 
     Parameters
     ----------
@@ -80,7 +80,9 @@ def about(name: str, kind: type[DmpError] = DmpError) -> Iterator[None]:
     try:
         yield
     except kind as error:
-        raise type(error)(f"{name}: {error}") from None
+        said = str(error)
+        named = said if said.startswith(f"{name}: ") else f"{name}: {said}"
+        raise type(error)(named) from None
 
 
 def beside(value: float, bound: float, form: str) -> str:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmpcli.errors import beside, printable
+from dmpcli.errors import InputError, about, beside, printable
 
 
 @pytest.mark.parametrize(
@@ -49,3 +49,10 @@ def test_no_number_crosses_or_meets_its_bound(bound, share, form):
 def test_what_would_move_a_cursor_or_hide_words_is_shown(said, shown):
     assert printable(said) == shown
     assert json.loads(printable(json.dumps(said, ensure_ascii=False)).replace("\n", "")) == said
+
+
+def test_a_file_is_named_once_however_many_say_it():
+    for said in ("row 3: no value", "a.csv: row 3: no value"):
+        with pytest.raises(InputError) as told, about("a.csv"):
+            raise InputError(said)
+        assert str(told.value) == "a.csv: row 3: no value"

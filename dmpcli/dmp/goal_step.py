@@ -49,11 +49,6 @@ class GoalFilter:
         return float(self.tau * (half + root) / self.k) if root else self.tau / half
 
 
-def still() -> Floats:
-    """Return the state of a goal that has not moved, shape (2, 3): delta in mm, and V."""
-    return np.zeros((2, 3))
-
-
 def response(filter_: GoalFilter, state: Floats, shift: Floats, count: int) -> Floats:
     """States at the next samples, the goal held where it is now.
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Integers
 from dmpcli.records.layouts import LENGTH
 from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table, is_text
@@ -139,9 +139,3 @@ def _mark(table: Table, status: list[str], bad: Booleans, column: str, what: str
     for row in np.flatnonzero(bad).tolist():
         if status[row] == OK:
             status[row] = f"{table.at(row)}, column {column!r}: {table.shown(column, row)} {what}"
-
-
-def offsets(places: PairPlaces, otherwise: float) -> Floats:
-    """Return the stand-off at each place, mm; `otherwise` where the table says none."""
-    said = [otherwise if place.offset is None else place.offset for place in places.places]
-    return np.array(said, dtype=float)

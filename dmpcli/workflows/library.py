@@ -18,6 +18,7 @@ from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, learned_skill, record, recordings, schemas, suffixes
 from dmpcli.records.learned_skill import LearnedSkill
+from dmpcli.records.mesh_formats import looks_like_mesh
 from dmpcli.records.pairs import FARTHEST, PairTable
 from dmpcli.records.schemas import OK
 from dmpcli.records.storage import Location, located
@@ -79,6 +80,8 @@ def read(path: str | Path, **said: Any) -> Any:
             return values.of_run(found, source)
         if found.schema is not schemas.DEMONSTRATION:
             raise InputError(f"{path}: is a {found.schema.name} file, which holds no stroke")
+    if looks_like_mesh(source):
+        raise InputError(f"{path}: is a mesh; `read_surface` reads surfaces")
     return values.demonstration(source, layout)
 
 

@@ -95,6 +95,7 @@ def test_numbers_in_any_dress_are_the_same_stroke(given):
         (lambda _: dmpcli.execute(NUMBER), "int is no trajectory"),
         (lambda _: dmpcli.report([1]), "list is no demonstration"),
         (lambda _: dmpcli.read("t.parquet", sep=";"), "sep: no such option"),
+        (lambda _: dmpcli.read("sample_runs/bench.stl"), "is a mesh; `read_surface`"),
     ],
 )
 def test_what_is_another_thing_is_told_as_that(drawn, call, message):
