@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from dmpcli.dmp.goal_step import GoalFilter, response, settling, still
+from dmpcli.dmp.goal_step import GoalFilter, response, settling
+
+STILL = np.zeros((2, 3))
 
 # Damping ratios of 0.5 to 2; what learning makes is 1.
 gains = st.builds(
@@ -34,7 +36,7 @@ def test_the_response_is_that_of_the_differential_equations(k, d):
 
 def test_a_critically_damped_step_has_its_closed_form():
     filter_ = GoalFilter(100.0, 20.0, 5.0, 0.02)
-    made = response(filter_, still(), np.array([10.0, 0.0, -3.0]), 300)
+    made = response(filter_, STILL, np.array([10.0, 0.0, -3.0]), 300)
     x = 2.0 * np.arange(1, 301) * 0.02  # d t / (2 tau)
     rise = 1.0 - (1.0 + x) * np.exp(-x)
     np.testing.assert_allclose(made[:, 0], np.outer(rise, [10.0, 0.0, -3.0]), atol=1e-12)
@@ -44,7 +46,7 @@ def test_a_critically_damped_step_has_its_closed_form():
 @given(gains, st.lists(ways, min_size=1, max_size=5), st.data())
 def test_whatever_the_goal_does_position_and_velocity_are_continuous(given_gains, goals, data):
     filter_ = GoalFilter(*given_gains)
-    state, fine = still(), GoalFilter(*given_gains[:3], given_gains[3] / 1000.0)
+    state, fine = STILL, GoalFilter(*given_gains[:3], given_gains[3] / 1000.0)
     for shift in goals:
         after = response(fine, state, shift, 1)[0]
         size = float(np.abs(state - shift).max() + np.abs(state).max())
@@ -56,7 +58,7 @@ def test_whatever_the_goal_does_position_and_velocity_are_continuous(given_gains
 @pytest.mark.slow
 @given(gains, st.lists(ways, min_size=1, max_size=4), st.integers(1, 50))
 def test_the_last_goal_is_reached_and_when_is_known(given_gains, goals, held):
-    filter_, state = GoalFilter(*given_gains), still()
+    filter_, state = GoalFilter(*given_gains), STILL
     for shift in goals[:-1]:
         state = response(filter_, state, shift, held)[-1]
     count = settling(filter_, state, goals[-1], 0.01)
@@ -70,14 +72,14 @@ def test_the_last_goal_is_reached_and_when_is_known(given_gains, goals, held):
 @given(gains, ways, ways, st.integers(1, 60))
 def test_responses_add_up_as_the_equations_are_linear(given_gains, one, other, count):
     filter_ = GoalFilter(*given_gains)
-    both = response(filter_, still(), one + other, count)
-    parts = response(filter_, still(), one, count) + response(filter_, still(), other, count)
+    both = response(filter_, STILL, one + other, count)
+    parts = response(filter_, STILL, one, count) + response(filter_, STILL, other, count)
     np.testing.assert_allclose(both, parts, atol=1e-9)
 
 
 @given(gains, ways, st.integers(1, 30), st.integers(1, 30))
 def test_stopping_on_the_way_changes_nothing(given_gains, shift, first, then):
     filter_ = GoalFilter(*given_gains)
-    state = response(filter_, still(), shift, first)[-1]
-    whole = response(filter_, still(), shift, first + then)[-1]
+    state = response(filter_, STILL, shift, first)[-1]
+    whole = response(filter_, STILL, shift, first + then)[-1]
     np.testing.assert_allclose(response(filter_, state, shift, then)[-1], whole, atol=1e-8)
