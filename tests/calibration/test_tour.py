@@ -191,7 +191,7 @@ def test_what_compensation_leaves_of_a_later_motion_is_below_a_tenth_of_a_newton
     left = []
     bench.tour._change = lambda sensed, rotation: left.append((sensed, rotation)) or np.zeros(6)
     for R in around(bench.home, 4, 0.4):
-        bench.tour._go((Scene().position, R), "a free motion")
+        bench.tour._go(Pose(Scene().position, R), "a free motion")
     assert len(left) > 500
     force = np.array([compensate(*each)[:3] for each in left[:500]])
     assert np.sqrt(np.mean(np.sum(force**2, axis=1))) < 0.1

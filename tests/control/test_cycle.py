@@ -13,6 +13,7 @@ from dmpcli.errors import RefusedError
 from dmpcli.instruments.clock import SimulatedClock
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import make
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.trajectory import StrokeTrajectory
 from tests.control.drag_fakes import FakeServo, drag_settings
 from tests.control.fake_sensors import StreamingSensor
@@ -62,7 +63,7 @@ def executed(stall, asleep):
     x = 50.0 * minimum_jerk(u)
     still = StrokeTrajectory(t, np.column_stack([x, 0 * x, 0 * x]), None, id="0")
     limits = Limits(250.0, 2250.0, 50_000.0, 0.785, 15.0, 333.0)
-    plan = make(still, PERIOD, 1.0, limits, (servo.position, servo.rotation), 20.0)
+    plan = make(still, PERIOD, 1.0, limits, Pose(servo.position, servo.rotation), 20.0)
     arm = ReadyArm(servo, servo.open(), clock)
     loop = ServoLoop(plan, limits, StopLimits(50.0, 0.1, 50.0, 5.0), arm)
     return loop, loop.run(Interruption()).failure

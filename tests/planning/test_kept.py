@@ -58,7 +58,7 @@ def plans_of_strokes():
                 found += [
                     one,
                     one.sizes,
-                    [one.at(i) for i in index],
+                    [(at.position, at.rotation) for at in map(one.at, index)],
                     [one.time_at(i) for i in index],
                     [one.phase_at(i) for i in index],
                     [one.draws_at(i) for i in index],
@@ -103,7 +103,7 @@ def checks_of_joints():
     source = stroke(2.0, 50.0, 0.4)
     for by in ([0, 0, 0], [-450, 0, 0], [100, -80, 60]):
         moved = replace(source, position=source.position + np.array(by, dtype=float))
-        one = plan.make(moved, 0.02, 1.0, WIDE, (moved.position[0], moved.rotation[0]), 25.0)
+        one = plan.make(moved, 0.02, 1.0, WIDE, moved.pose(0), 25.0)
         checks, joints = preflight.by_joints(one, moved, reach, None)
         found += [[replace(c, remedy="") for c in checks], joints]
     return found
@@ -165,7 +165,7 @@ def verdicts_in_words():
     for source in strokes()[:3]:
         for by in ([0.0, 0.0, 0.0], [-350.0, 120.0, 0.0], [500.0, -80.0, 60.0]):
             moved = replace(source, position=source.position + np.array(by))
-            start = moved.position[0] + [0.0, 20.0, 9.0], turned([0.0, 0.0, 0.2])
+            start = Pose(moved.position[0] + [0.0, 20.0, 9.0], turned([0.0, 0.0, 0.2]))
             one = plan.make(moved, 0.02, 1.0, WIDE, start, 60.0)
             for limits in (WIDE, TIGHT):
                 checks = preflight.within_limits(one, moved, limits)

@@ -55,8 +55,7 @@ class Bench:
         way = state.position + u[:, None] * [20.0, 10.0, 0.0]
         stroke = StrokeTrajectory(t, way, np.broadcast_to(state.rotation, (101, 3, 3)), id="0")
         stroke = replace(stroke, events=events)
-        here = (state.position, state.rotation)
-        plan = make(stroke, PERIOD, 1.0, LIMITS, here, 20.0)
+        plan = make(stroke, PERIOD, 1.0, LIMITS, state.pose, 20.0)
         arm = ReadyArm(self.servo, info, self.clock).as_told()
         switch = outputs.OutputSwitch(self.servo, PERIOD, info.lookahead) if events else None
         return kind(plan, LIMITS, StopLimits(5.0, 0.1, 50.0, 5.0), arm, outputs=switch), way
