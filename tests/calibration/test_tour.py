@@ -18,6 +18,7 @@ from dmpcli.kinematics.reachability import Reach
 from dmpcli.settings.calibrate import CalibrateSettings
 from dmpcli.simulation.mock import PEN, Lab, MockSensor, MockServo, Scene
 from dmpcli.simulation.mock.parameters import Faults, ServoParameters
+from dmpcli.spatial.pose import Pose
 
 
 class Bench:
