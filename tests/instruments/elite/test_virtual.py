@@ -241,8 +241,8 @@ def test_outputs_are_switched_on_the_way_and_off_at_its_end(bench):
     rows = {text: i for i, text in enumerate(columns["event"]) if text}
     assert list(rows) == ["on DO1", "on DO4"]
     actual = np.column_stack([columns[name] for name in "xyz"])
-    # 24 mm in a second: 0.9 mm in a period at the fastest, the monitor is 8 ms behind, and where the
-    # machine is busy a cycle wakes some milliseconds late.
+    # 24 mm in a second: 0.9 mm in a period at the fastest, the monitor is 8 ms behind, and on a
+    # busy machine a cycle wakes some milliseconds late.
     for text, sample in (("on DO1", 30), ("on DO4", 70)):
         assert np.linalg.norm(actual[rows[text]] - way[sample]) < 2.0
 
