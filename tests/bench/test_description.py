@@ -25,7 +25,6 @@ from tests.outside_judge import judge
 
 pytestmark = needs(BENCH)
 
-mujoco = pytest.importorskip("mujoco")
 TOOL = "sample_runs/bench_pen.json"
 
 
@@ -44,6 +43,8 @@ def kept(text, name="arm.xml"):
 
 def compiled(path):
     """The file as MuJoCo itself has it, but for the shells, which are not there."""
+    import mujoco
+
     spec = mujoco.MjSpec.from_file(path)
     for geom in list(spec.geoms):
         spec.delete(geom)
@@ -65,12 +66,16 @@ def bare(path, arm):
 
 
 def full(model, data):
+    import mujoco
+
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
     return M[:6, :6]
 
 
 def same_dynamics(path, arm, rotors=None, tolerance=1e-9):
+    import mujoco
+
     theirs, ours = compiled(path), bare(path, arm)
     theirs[0].opt.gravity[:] = ours[0].opt.gravity
     if rotors is not None:
@@ -130,6 +135,8 @@ def test_a_file_of_the_published_lengths_leaves_the_arm_as_it_is():
 )
 def test_where_lengths_are_corrected_the_arm_moves_as_the_file_says(base, turn, at):
     """Against MuJoCo's own frames: the same but for one transform of base and one of flange."""
+    import mujoco
+
     name = kept(mjcf(a3=0.3912, d4=0.1344, d5=0.0991, base=base))
     found = description.read(name, "ur5e")
     assert found.told == (
@@ -139,6 +146,7 @@ def test_where_lengths_are_corrected_the_arm_moves_as_the_file_says(base, turn, 
     model, data = compiled(name)
 
     def ends(joints):
+
         data.qpos[:] = joints
         mujoco.mj_kinematics(model, data)
         theirs, ours = np.eye(4), np.eye(4)
@@ -284,6 +292,8 @@ def test_without_its_package_the_extra_is_named(monkeypatch):
 
 def test_the_makers_urdf_and_the_chain_agree_in_this_tests_own_reading_too():
     """Of the oracle: MuJoCo's frames of the URDF are those of the product of exponentials."""
+    import mujoco
+
     model, data = compiled(kept(urdf(rounded=15), "arm.urdf"))
     for joints in np.random.default_rng(4).uniform(-3.0, 3.0, (10, 6)):
         data.qpos[:] = joints
