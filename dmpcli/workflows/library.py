@@ -169,7 +169,7 @@ def fit(
     check_said(settings, surface is not None)
     resolved = resolve(FitSettings, settings, preset)
     files = [one.file() for one in several]
-    forms = [one.layout for one in several]
+    forms = [one.form for one in several]
     force = resolved.force_profile
     strokes = []
     for file, form in zip(files, forms, strict=True):

@@ -1,6 +1,7 @@
 """The values of the Python API: demonstrations, trajectories, batches and runs."""
 
 import contextlib
+import hashlib
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -35,6 +36,27 @@ from dmpcli.workflows.given_arrays import real, rotations
 from dmpcli.workflows.recording import recording
 
 
+def _digest(one: Trajectory) -> bytes:
+    """Return what tells whether arrays are still those that were read or drawn."""
+    force = one.force if isinstance(one, StrokeTrajectory) else None
+    arrays = (one.t, one.position, one.rotation, one.normal, force)
+    found = hashlib.sha256()
+    for part in arrays:
+        found.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
+    return found.digest()
+
+
+def _remember(one: "Demonstration | DrawnTrajectory | Run") -> None:
+    """Note what the arrays are, once: a copy with others knows that they are."""
+    if not one.as_read:
+        object.__setattr__(one, "as_read", _digest(one))
+
+
+def _as_it_was(one: "Demonstration | DrawnTrajectory | Run") -> bool:
+    """Tell whether file and record still say what the arrays do; they may have been changed."""
+    return one.as_read == _digest(one)
+
+
 @dataclass(frozen=True)
 class Demonstration(Trajectory):
     """What the tool did while it was dragged; from arrays, or of a file.
@@ -55,6 +77,7 @@ class Demonstration(Trajectory):
 
     source: Source | None = field(default=None, repr=False, compare=False)
     layout: Layout | None = field(default=None, repr=False, compare=False)
+    as_read: bytes = field(default=b"", repr=False, compare=False)
 
     def __post_init__(self) -> None:
         t, position = real("t", self.t), real("position", self.position)
@@ -65,10 +88,16 @@ class Demonstration(Trajectory):
         R = None if self.rotation is None else rotations("rotation", self.rotation, t.shape)
         for name, value in (("t", t), ("position", position), ("rotation", R)):
             object.__setattr__(self, name, value)
+        _remember(self)
+
+    @property
+    def form(self) -> Layout | None:
+        """How `file` is read, where that is not dmpcli's own."""
+        return self.layout if _as_it_was(self) else None
 
     def file(self) -> Source:
         """Return its file; of arrays the one that they would be written as."""
-        if self.source is not None:
+        if self.source is not None and _as_it_was(self):
             return self.source
         columns = _columns(self)
         made = Record(schemas.DEMONSTRATION, columns, Provenance("Demonstration"))
@@ -81,6 +110,10 @@ class DrawnTrajectory(StrokeTrajectory):
 
     record: Record | None = field(default=None, repr=False, compare=False)
     source: Source | None = field(default=None, repr=False, compare=False)
+    as_read: bytes = field(default=b"", repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        _remember(self)
 
 
 @dataclass(frozen=True)
@@ -97,6 +130,10 @@ class Run(Trajectory):
 
     record: Record | None = field(default=None, repr=False, compare=False)
     source: Source | None = field(default=None, repr=False, compare=False)
+    as_read: bytes = field(default=b"", repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        _remember(self)
 
 
 @dataclass(frozen=True)
@@ -266,7 +303,7 @@ def _columns(one: Trajectory) -> dict[str, Any]:
 
 def record_of(one: Trajectory) -> Record:
     """Return the record that a trajectory or run is written as."""
-    if isinstance(one, DrawnTrajectory | Run) and one.record is not None:
+    if isinstance(one, DrawnTrajectory | Run) and one.record is not None and _as_it_was(one):
         return one.record
     columns = _columns(one)
     if not len(columns["t"]):
@@ -301,7 +338,7 @@ def source_of(value: Any, path: str = "") -> Source:
         raise InputError(f"{name}only a skill that `fit` or `read` gave can be written")
     if isinstance(value, Demonstration):
         return value.file()
-    if isinstance(value, DrawnTrajectory | Run) and value.source is not None:
+    if isinstance(value, DrawnTrajectory | Run) and value.source is not None and _as_it_was(value):
         return value.source
     if isinstance(value, Trajectory):
         made = record_of(value)
@@ -345,6 +382,6 @@ def measured(one: Trajectory) -> ReportedStroke:
     """Return a stroke as reports measure it."""
     if isinstance(one, Demonstration):
         source = one.file()
-        found = recordings.read(source, one.layout)
+        found = recordings.read(source, one.form)
         return Recorded(found.stroke, "demonstration", source.name, source.sha256, None).stroke()
     return strokes_of(record_of(one), "stroke")[0]

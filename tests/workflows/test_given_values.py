@@ -1,6 +1,7 @@
 """What a caller gives is read as it is meant, or refused by name: never silently something else."""
 
 import copy
+import dataclasses
 import logging
 import pickle
 from concurrent.futures import ThreadPoolExecutor
@@ -169,3 +170,24 @@ def test_the_callers_logging_is_not_touched():
     dmpcli.fit(dmpcli.Demonstration(T, P))
     assert (root.handlers[:], root.level, logging.root.manager.disable) == before
     assert not [one for one in logging.getLogger("dmpcli").handlers if one.level == 0 and one.name]
+
+
+@pytest.mark.parametrize("change", ["in place", "a copy"])
+def test_arrays_that_were_changed_are_what_is_learned_written_and_drawn(change, tmp_path, skill):
+    def shifted(one):
+        if change == "a copy":
+            return dataclasses.replace(one, position=one.position + [0.0, 0.0, 5.0])
+        one.position[:] += [0.0, 0.0, 5.0]
+        return one
+
+    dmpcli.write(dmpcli.Demonstration(T, P), tmp_path / "demo.parquet")
+    read = shifted(dmpcli.read(tmp_path / "demo.parquet"))
+    dmpcli.write(read, tmp_path / "moved.parquet")
+    np.testing.assert_allclose(dmpcli.read(tmp_path / "moved.parquet").position, P + [0, 0, 5.0])
+    assert dmpcli.fit(read).sha256 != dmpcli.fit(dmpcli.Demonstration(T, P)).sha256
+    drawn = shifted(dmpcli.generalize(skill, HERE, THERE))
+    dmpcli.write(drawn, tmp_path / "drawn.parquet")
+    again = dmpcli.read(tmp_path / "drawn.parquet")
+    assert again.position[0] == pytest.approx([0.0, 0.0, 5.0], abs=1e-9)
+    [plan] = dmpcli.execute(drawn, dry_run=True, approach=20.0)
+    assert plan.plan.position[plan.plan.last][2] == pytest.approx(5.0, abs=1e-6)
