@@ -100,6 +100,7 @@ def write(value: Any, path: str | Path) -> None:
         It cannot be written, or is none of these.
     """
     if isinstance(value, TrajectoryBatch):
+        value.check()
         if value.ready is None:
             raise InputError(f"{path}: this batch was read from a folder; copy that one")
         batches.write(value.ready, located(path), BatchOptions(on_error="skip"))

@@ -162,6 +162,28 @@ class TrajectoryBatch(Trajectory):
     ids: list[str] = field(default_factory=list)
     ready: Ready | None = field(default=None, repr=False, compare=False)
     folder: Location | None = field(default=None, repr=False, compare=False)
+    as_drawn: Floats | None = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.as_drawn is None:
+            object.__setattr__(self, "as_drawn", self.position)
+        # A batch is written, reported and executed as it was drawn.
+        for part in (self.t, self.position, self.rotation, self.normal):
+            if part is not None:
+                part.flags.writeable = False
+
+    def check(self) -> None:
+        """Refuse to take what was drawn for arrays that are others.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.position is not self.as_drawn:
+            raise InputError(
+                "the batch's arrays were changed, and it would be taken as it was drawn; make "
+                "trajectories of them one by one"
+            )
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -369,6 +391,7 @@ def written(value: Any, path: str) -> bytes:
 @contextlib.contextmanager
 def folder_of(batch: TrajectoryBatch) -> Iterator[Location]:
     """Lend the folder of a batch: the one that it was read from, else one that is removed again."""
+    batch.check()
     if batch.folder is not None:
         yield batch.folder
         return

@@ -191,3 +191,15 @@ def test_arrays_that_were_changed_are_what_is_learned_written_and_drawn(change, 
     assert again.position[0] == pytest.approx([0.0, 0.0, 5.0], abs=1e-9)
     [plan] = dmpcli.execute(drawn, dry_run=True, approach=20.0)
     assert plan.plan.position[plan.plan.last][2] == pytest.approx(5.0, abs=1e-6)
+
+
+def test_a_batch_is_taken_as_it_was_drawn_or_refused(skill, tmp_path):
+    many = dmpcli.generalize(skill, HERE, np.array([THERE, (0.0, 90.0, 0.0)]))
+    with pytest.raises(ValueError, match="read-only"):
+        many.position[0] += 5.0
+    moved = dataclasses.replace(many, position=many.position + 5.0)
+    for take in (lambda: dmpcli.write(moved, tmp_path / "b"), lambda: dmpcli.report(moved)):
+        with pytest.raises(dmpcli.InputError, match="arrays were changed"):
+            take()
+    assert not (tmp_path / "b").exists()
+    np.testing.assert_allclose(moved[0].position, many[0].position + 5.0)
