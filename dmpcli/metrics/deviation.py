@@ -223,11 +223,6 @@ class Taught:
         return near
 
 
-def nearest_rms(points: Floats, polyline: Floats) -> float:
-    """Root mean square of `nearest_distance`, in the points' unit."""
-    return float(_rms(nearest_distance(points, polyline)[None])[0])
-
-
 def nearest_distance(points: Floats, polyline: Floats) -> Floats:
     """Distance of each point to the nearest point of a polyline; segments count, not only corners.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Halves, Integers, Singles
+from dmpcli.arrays import Floats, Halves, Singles
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
 
@@ -325,18 +325,6 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
         if beside > -_ON:
             return True
     return False
-
-
-@kernel
-def search(facets: Facets, points: Floats) -> tuple[Floats, Integers]:
-    """Closest points (N, 3), mm, and their faces (N,)."""
-    nodes, offs = stack()
-    feet, face = np.empty_like(points), np.empty(len(points), dtype=np.int64)
-    for i in range(len(points)):
-        foot, row = closest(facets, (points[i, 0], points[i, 1], points[i, 2]), nodes, offs)
-        feet[i, 0], feet[i, 1], feet[i, 2] = foot
-        face[i] = facets.numbers[row, FACE]
-    return feet, face
 
 
 @kernel
