@@ -17,7 +17,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1] / "dmpcli"
 
 CALLED_BY_OTHERS = {
-    "dmpcli.bench.world.World.tip": "docs/bench.md: what no robot tells",
     "dmpcli.bench.world.World.compliance": "docs/bench.md: what no robot tells",
     "dmpcli.cli.options": "typer, by its decorator",
     "dmpcli.instruments.drivers.Pacing": "drivers written for version 0.1.0",
@@ -93,13 +92,13 @@ class Package:
                     self.attributes.setdefault(name, []).append((module, node.lineno))
                     if isinstance(owner, ast.Name) and owner.id in imported:
                         self._use(".".join(imported[owner.id]), name)
-                case ast.Constant(value=str(name)) if name.isidentifier():
+                case ast.Constant(value=str() as name) if name.isidentifier():
                     # Of a table of names, as __init__.py has one: "fit": "workflows.library".
                     self.attributes.setdefault(name, []).append((module, node.lineno))
                 case ast.Dict(keys=keys, values=values):
                     for key, value in zip(keys, values, strict=True):
                         if isinstance(key, ast.Constant) and isinstance(value, ast.Constant):
-                            self.used.add((f"{self.name}.{value.value}", str(key.value)))
+                            self.used.add((f"{self.name}.{value.value!s}", str(key.value)))
 
     def _use(self, module: str, name: str, whole: bool = False) -> None:
         """Take a name of a module as used, where it is defined and where it is handed on."""

@@ -2,8 +2,8 @@
 
 They follow one another in one folder: what a later one reads, an earlier one wrote, or is one of
 the files that a user has: meshes, pairs, goals over time, a tool without weight, a recording of
-another program, a drawing, points touched on a mesh, and what a crash has left. A real cell is named
-by the addresses `SENSOR` and `ROBOT`.
+another program, a drawing, points touched on a mesh, and what a crash has left. A real cell is
+named by the addresses `SENSOR` and `ROBOT`.
 """
 
 from typing import NamedTuple
