@@ -166,10 +166,10 @@ class _Description:
         """By how much the ends of both chains differ in the worst of some postures, mm and rad."""
         arm, base, worst = lain.arm, lain.base, (0.0, 0.0)
         self._pose_at(np.zeros(6))
-        flange = (base @ Pose(*chain.forward_one(arm, np.zeros(6)))).inverse() @ self._end()
+        flange = (base @ chain.forward_one(arm, np.zeros(6))).inverse() @ self._end()
         for joints in np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, 6)):
             self._pose_at(joints)
-            there, here = self._end(), base @ Pose(*chain.forward_one(arm, joints)) @ flange
+            there, here = self._end(), base @ chain.forward_one(arm, joints) @ flange
             mm = float(np.linalg.norm(there.position - here.position))
             turned = float(np.linalg.norm(log_one(here.rotation.T @ there.rotation)))
             worst = max(worst[0], mm), max(worst[1], turned)
@@ -184,7 +184,8 @@ class _Description:
     def _masses(self, arm: Arm, base: Pose) -> tuple[Floats, Floats, Floats]:
         """Add up what hangs on each joint, in the frame that turns with it."""
         found, data = self._model, self._data
-        position, rotation = turning_frames(arm)
+        frames = turning_frames(arm)
+        position, rotation = frames.position, frames.rotation
         mass, centre, inertia = np.zeros(6), np.zeros((6, 3)), np.zeros((6, 3, 3))
         for i, body in enumerate(found.jnt_bodyid):
             parts = np.flatnonzero(found.body_weldid == body)

@@ -7,6 +7,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.kinematics.chain import frames
 from dmpcli.kinematics.models import Arm, model
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp_one
 
 # Of the links, kg: of EC66 as in the maker's ec66_description.urdf, of UR5e as in the maker's
@@ -69,7 +70,7 @@ def published(name: str) -> Links:
     return Links(arm, mass, 0.5 * end, about[:, None, None] * np.eye(3))
 
 
-def turning_frames(arm: Arm) -> tuple[Floats, Floats]:
+def turning_frames(arm: Arm) -> Pose:
     """Frames that turn with the joints, where all of them stand at 0.
 
     Parameters
@@ -78,10 +79,9 @@ def turning_frames(arm: Arm) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    position : array, shape (6, 3)
-        mm, base frame.
-    rotation : array, shape (6, 3, 3)
+    Pose
+        Six, in the base frame.
     """
-    position, rotation = frames(arm, np.zeros(6))
+    link = frames(arm, np.zeros(6))
     turned = np.array([exp_one(np.array([0.0, 0.0, offset])) for offset in arm.offset])
-    return position[:6], rotation[:6] @ turned
+    return Pose(link.position[:6], link.rotation[:6] @ turned)

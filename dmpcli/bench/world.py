@@ -133,7 +133,7 @@ class World:
     def _ready(self) -> Floats:
         """The usual posture, turned to where the arm shall stand."""
         ready = _READY[self.parameters.arm].copy()
-        flange, _ = chain.forward_one(self.arm, ready)
+        flange = chain.forward_one(self.arm, ready).position
         at = self.parameters.position
         ready[0] += np.arctan2(at[1], at[0]) - np.arctan2(flange[1], flange[0])
         ready[0] = np.remainder(ready[0] + np.pi, 2.0 * np.pi) - np.pi
@@ -198,8 +198,7 @@ class World:
         RefusedError
             Out of reach, or beyond a joint's limit.
         """
-        flange, rotation = self.parameters.tool.flange(pose.position, pose.rotation)
-        return inverse.nearest(self.arm, flange, rotation, near)
+        return inverse.nearest(self.arm, self.parameters.tool.flange(pose), near)
 
     def start(self, period: float) -> None:
         """Take one set-point every `period` s from now on."""

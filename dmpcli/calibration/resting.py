@@ -11,6 +11,7 @@ from dmpcli.control.force_sensing import Sensing
 from dmpcli.errors import InstrumentError
 from dmpcli.instruments.protocols import Clock, RobotState, Sample, Servo
 from dmpcli.records.static_poses import StaticPose
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp, log
 
 STILL, STILL_ANGLE = 0.05, 0.002
@@ -101,10 +102,10 @@ class Watcher:
             raise InstrumentError(
                 f"force sensor: {len(heard)} readings in {duration:g} s; dwell longer"
             )
-        position, rotation = _mean(states)
+        mean = _mean(states)
         moved, turned = _spread(states)
         t = self._clock.now() - self._begin
-        return StaticPose(t, position, rotation, moved, turned, *_readings(heard))
+        return StaticPose(t, mean.position, mean.rotation, moved, turned, *_readings(heard))
 
 
 def at_rest(moved: float, turned: float) -> bool:
@@ -112,19 +113,19 @@ def at_rest(moved: float, turned: float) -> bool:
     return moved <= STILL and turned <= STILL_ANGLE
 
 
-def _mean(states: Sequence[RobotState]) -> tuple[Floats, Floats]:
+def _mean(states: Sequence[RobotState]) -> Pose:
     """Mean of poses close to each other."""
     first = states[0].rotation
     turns = log(np.array([state.rotation for state in states]) @ first.T)
     position = np.mean([state.position for state in states], axis=0)
-    return position, np.asarray(exp(turns.mean(axis=0)) @ first)
+    return Pose(position, np.asarray(exp(turns.mean(axis=0)) @ first))
 
 
 def _spread(states: Sequence[RobotState]) -> tuple[float, float]:
     """Furthest of the poses from their mean, mm and rad."""
-    position, rotation = _mean(states)
-    away = np.array([state.position for state in states]) - position
-    turns = log(np.array([state.rotation for state in states]) @ rotation.T)
+    mean = _mean(states)
+    away = np.array([state.position for state in states]) - mean.position
+    turns = log(np.array([state.rotation for state in states]) @ mean.rotation.T)
     moved, turned = (float(np.linalg.norm(part, axis=-1).max()) for part in (away, turns))
     return moved, turned
 

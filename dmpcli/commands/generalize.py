@@ -232,8 +232,8 @@ def _check_destination(
     reproduce: bool,
 ) -> None:
     from dmpcli.records import file_io, record, suffixes
+    from dmpcli.records.columns import FARTHEST
     from dmpcli.records.object_store import ObjectPath
-    from dmpcli.records.pairs import FARTHEST
     from dmpcli.workflows.ranges import within
 
     if reproduce:

@@ -252,8 +252,9 @@ class Recorder(ControlLoop):
         else:
             reference = move(self._law, self._reference, cycle.wrench, self._home, self._bounds)
         self._reference = reference
-        guards.check_setpoint(reference.position, reference.rotation, self._workspace)
-        return Pose(reference.position, reference.rotation)
+        setpoint = Pose(reference.position, reference.rotation)
+        guards.check_setpoint(setpoint, self._workspace)
+        return setpoint
 
     def _listen(self, cycle: Cycle) -> None:
         """Make the drag heavier along the tool where it chatters on the work."""

@@ -118,22 +118,21 @@ def check_inside(position: Floats, box: Box | None, what: str) -> None:
             )
 
 
-def check_setpoint(position: Floats, rotation: Floats, box: Box | None) -> None:
+def check_setpoint(setpoint: Pose, box: Box | None) -> None:
     """Refuse to send what is not a pose, or one outside the workspace.
 
     Parameters
     ----------
-    position, rotation : array, shape (3,) and (3, 3)
-        mm.
+    setpoint : Pose
     box : tuple of float or None
 
     Raises
     ------
     RefusedError
     """
-    if not finite(position, rotation):
+    if not finite(setpoint.position, setpoint.rotation):
         raise RefusedError("the next set-point is not a number and was not sent; check settings")
-    check_inside(position, box, "the next set-point")
+    check_inside(setpoint.position, box, "the next set-point")
 
 
 def check_wrench(wrench: Floats, force: float, torque: float) -> None:

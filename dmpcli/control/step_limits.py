@@ -79,10 +79,10 @@ class StepLimits:
         ------
         RefusedError
         """
-        position, rotation = setpoint.position, setpoint.rotation
-        guards.check_setpoint(position, rotation, self._limits.workspace)
+        guards.check_setpoint(setpoint, self._limits.workspace)
         if before is None:
             return
+        position, rotation = setpoint.position, setpoint.rotation
         period, limits = self._period, self._limits
         step = np.concatenate([position - before.position, log_one(rotation @ before.rotation.T)])
         speed, turning = _sizes(step / period)

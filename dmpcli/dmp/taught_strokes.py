@@ -16,7 +16,6 @@ from dmpcli.errors import InputError, RefusedError
 from dmpcli.spatial import rotations
 from dmpcli.surfaces import plane
 from dmpcli.surfaces.frame_smoothing import smoothed
-from dmpcli.surfaces.inverse_chart import invert
 from dmpcli.surfaces.surface import Status, Surface
 
 # A recording that lies farther off the surface everywhere was not taught on it, mm.
@@ -218,6 +217,8 @@ def _on_surface(number: int, seen: Preprocessed, surface: Surface, closed: bool)
             f"demonstration {number} begins {ends.distance[0]:.1f} mm and ends "
             f"{ends.distance[1]:.1f} mm off the surface; check --surface-pose and --surface-unit"
         )
+    from dmpcli.surfaces.inverse_chart import invert  # loads all of meshes
+
     charts = surface.charts(position[:1], position[-1:], side, closed_axes)
     inverse = invert(charts, position[None])
     if not inverse.complete[0]:

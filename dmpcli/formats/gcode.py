@@ -238,7 +238,7 @@ def decode(source: Source, tolerance: float = 0.01, travel: float = 50.0) -> lis
         raise InputError(f"{source.name}: holds no cut (G1, G2, G3), only rapid moves or none")
     if not ours:
         _cuts(moves, machine.rapid)
-    return moves.strokes(lambda values: (values, None))
+    return moves.strokes()
 
 
 def _cuts(moves: ProgramMoves, rapid: list[bool]) -> None:

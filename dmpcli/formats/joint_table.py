@@ -10,6 +10,7 @@ from dmpcli.formats.csv_table import table
 from dmpcli.formats.motion import Motion
 from dmpcli.kinematics.models import Arm
 from dmpcli.kinematics.path import follow
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
 
 
@@ -39,11 +40,11 @@ def with_joints(motion: Motion, arm: Arm, tool: Tool | None, start: Floats | Non
     for one in motion.strokes:
         if one.joints is None:
             assert one.rotation is not None
-            position, rotation = one.position, np.asarray(one.rotation)
+            flange = Pose(one.position, np.asarray(one.rotation))
             if tool is not None:
-                position, rotation = tool.flange(position, rotation)
+                flange = tool.flange(flange)
             period = float(np.median(np.diff(one.t)))
-            found = follow(arm, position[None], rotation[None], period, start)
+            found = follow(arm, flange.position[None], flange.rotation[None], period, start)
             where = f"{motion.name}: stroke {one.id!r}"
             for peak, what in (
                 (found.missing, "is out of reach"),

@@ -33,6 +33,7 @@ from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import matrices
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
 
 LONGEST_NAME = 24
@@ -232,6 +233,6 @@ def _target(moves: ProgramMoves, line: int, words: str) -> tuple[float, ...]:
     return tuple(entries[name] for name in _NAMES)
 
 
-def _poses(values: Floats) -> tuple[Floats, Floats]:
+def _poses(values: Floats) -> Pose:
     # Ours are X-Y-Z by name, whatever the order of turning: C about x, B about y, A about z.
-    return values[:, :3], matrices("rpy", np.radians(values[:, [5, 4, 3]]))
+    return Pose(values[:, :3], matrices("rpy", np.radians(values[:, [5, 4, 3]])))

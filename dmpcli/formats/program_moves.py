@@ -18,9 +18,10 @@ from dmpcli.messages import warn
 from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import log
 
-Poses = Callable[[Floats], tuple[Floats, Floats | None]]
+Poses = Callable[[Floats], Pose]
 """From the numbers of a program's targets, shape (n, k), to positions, mm, and rotations."""
 
 BEGIN, END = "stroke", "end of stroke"
@@ -133,8 +134,8 @@ class ProgramMoves:
         """Return the error that says what is wrong with a line."""
         return InputError(f"{self.name}: line {line}: {what}")
 
-    def strokes(self, poses: Poses) -> list[MotionStroke]:
-        """Return the strokes, each with time from 0.
+    def strokes(self, poses: Poses | None = None) -> list[MotionStroke]:
+        """Return the strokes, each with time from 0; without `poses` targets are positions.
 
         Raises
         ------
@@ -149,7 +150,10 @@ class ProgramMoves:
                 f"{self.name}: line {line}: positions are in {frame}, and are taken as they stand; "
                 "in the robot's base they lie elsewhere"
             )
-        position, rotation = poses(np.array(self.targets, dtype=float))
+        position, rotation = np.array(self.targets, dtype=float), None
+        if poses is not None:
+            made = poses(position)
+            position, rotation = made.position, made.rotation
         seconds = self._seconds(position, rotation)
         found = []
         for number, (first, last, name) in enumerate(self._spans()):

@@ -28,6 +28,7 @@ from dmpcli.records.file_io import Source
 from dmpcli.records.rotation_forms import wrong
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_quaternion, to_quaternion
 from dmpcli.spatial.wrench import Tool
 
@@ -221,6 +222,6 @@ def _numbers(text: str) -> tuple[float, ...]:
     return tuple(map(float, parts_))
 
 
-def _poses(values: Floats) -> tuple[Floats, Floats]:
+def _poses(values: Floats) -> Pose:
     q = values[:, [4, 5, 6, 3]]
-    return values[:, :3], from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
+    return Pose(values[:, :3], from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True)))

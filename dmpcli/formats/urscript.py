@@ -32,6 +32,7 @@ from dmpcli.formats.toolpath import (
 from dmpcli.records.file_io import Source
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial.output_events import OutputEvent
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp, log
 from dmpcli.spatial.wrench import Tool
 
@@ -185,5 +186,5 @@ def _how(speed: float, seconds: float) -> dict[str, float]:
     return {"seconds": seconds} if seconds else {"speed": speed}
 
 
-def _poses(values: Floats) -> tuple[Floats, Floats]:
-    return values[:, :3] * 1000.0, exp(values[:, 3:])
+def _poses(values: Floats) -> Pose:
+    return Pose(values[:, :3] * 1000.0, exp(values[:, 3:]))

@@ -82,8 +82,9 @@ class JointSpace:
             Out of reach, or beyond a joint's limit.
         """
         attitude = tcp.rotation @ self._attitude.T
-        flange = self._base.T @ (tcp.position - attitude @ self._reach)
-        return inverse.nearest(self._arm, flange, self._base.T @ attitude @ self._flange.T, before)
+        position = self._base.T @ (tcp.position - attitude @ self._reach)
+        flange = Pose(position, self._base.T @ attitude @ self._flange.T)
+        return inverse.nearest(self._arm, flange, before)
 
     def step(self, tcp: Pose, before: Floats, period: float) -> Floats:
         """Joint angles of a TCP pose that the arm can reach from the last ones within a period.
@@ -200,9 +201,9 @@ class JointSpace:
         return distance <= most and angle <= most_angle
 
     def _tcp(self, joints: Floats, base: Floats, flange: Floats) -> Pose:
-        position, rotation = chain.forward_one(self._arm, joints)
-        attitude = base @ rotation @ flange
-        return Pose(base @ position + attitude @ self._reach, attitude @ self._attitude)
+        end = chain.forward_one(self._arm, joints)
+        attitude = base @ end.rotation @ flange
+        return Pose(base @ end.position + attitude @ self._reach, attitude @ self._attitude)
 
 
 def _about_z(angle: float) -> Floats:

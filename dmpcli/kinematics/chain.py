@@ -1,4 +1,4 @@
-"""From joint angles to the flange: forward kinematics and the geometric Jacobian."""
+"""From joint angles to the flange: forward kinematics."""
 
 import math
 from functools import lru_cache
@@ -8,12 +8,13 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.kinematics.models import Arm
+from dmpcli.spatial.pose import Pose
 
 # Origin, mm, and axis of a joint.
 _Joint: TypeAlias = tuple[float, float, float, float, float, float]
 
 
-def forward(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
+def forward(arm: Arm, q: Floats) -> Pose:
     """Pose of the flange in the base frame.
 
     Parameters
@@ -24,15 +25,14 @@ def forward(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    position : array, shape (..., 3)
-        mm.
-    rotation : array, shape (..., 3, 3)
+    Pose
+        With the same leading axes.
     """
-    position, rotation = frames(arm, q)
-    return position[..., 6, :], rotation[..., 6, :, :]
+    links = frames(arm, q)
+    return Pose(links.position[..., 6, :], links.rotation[..., 6, :, :])
 
 
-def forward_one(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
+def forward_one(arm: Arm, q: Floats) -> Pose:
     """`forward` of one set of joint angles, in plain floats: several times faster, for loops.
 
     Parameters
@@ -40,20 +40,11 @@ def forward_one(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
     arm : Arm
     q : array, shape (6,)
         rad.
-
-    Returns
-    -------
-    position : array, shape (3,)
-        mm.
-    rotation : array, shape (3, 3)
     """
-    position, rotation, _ = _walked(arm, q)
-    return position, rotation
+    return _walked(arm, q)[0]
 
 
-def forward_moving(
-    arm: Arm, q: Floats, speeds: Floats, tip: Floats
-) -> tuple[Floats, Floats, Floats]:
+def forward_moving(arm: Arm, q: Floats, speeds: Floats, tip: Floats) -> tuple[Pose, Floats]:
     """`forward_one`, and how a point fixed to the flange moves while the joints turn.
 
     Parameters
@@ -66,25 +57,23 @@ def forward_moving(
 
     Returns
     -------
-    position : array, shape (3,)
-        Of the flange, mm.
-    rotation : array, shape (3, 3)
+    flange : Pose
     velocity : array, shape (6,)
         Of the point, mm/s, and angular, rad/s; base axes. The sum over the joints of
         ``[z × (p - p_i), z]`` times the joint's speed.
     """
-    position, rotation, joints = _walked(arm, q)
-    x, y, z = (position + rotation @ tip).tolist()
+    flange, joints = _walked(arm, q)
+    x, y, z = (flange.position + flange.rotation @ tip).tolist()
     vx = vy = vz = wx = wy = wz = 0.0
     for speed, (px, py, pz, zx, zy, zz) in zip(speeds.tolist(), joints, strict=True):
         vx += speed * (zy * (z - pz) - zz * (y - py))
         vy += speed * (zz * (x - px) - zx * (z - pz))
         vz += speed * (zx * (y - py) - zy * (x - px))
         wx, wy, wz = wx + speed * zx, wy + speed * zy, wz + speed * zz
-    return position, rotation, np.array([vx, vy, vz, wx, wy, wz])
+    return flange, np.array([vx, vy, vz, wx, wy, wz])
 
 
-def _walked(arm: Arm, q: Floats) -> tuple[Floats, Floats, list[_Joint]]:
+def _walked(arm: Arm, q: Floats) -> tuple[Pose, list[_Joint]]:
     """Pose of the flange; origin and axis of each joint that was passed on the way."""
     # Origin and axes of the link frame that has been reached.
     px = py = pz = 0.0
@@ -99,7 +88,7 @@ def _walked(arm: Arm, q: Floats) -> tuple[Floats, Floats, list[_Joint]]:
         yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
         zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
     rotation: Floats = np.array([[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]])
-    return np.array([px, py, pz]), rotation, joints
+    return Pose(np.array([px, py, pz]), rotation), joints
 
 
 @lru_cache
@@ -109,7 +98,7 @@ def _links(arm: Arm) -> list[tuple[float, float, float, float, float]]:
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def frames(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
+def frames(arm: Arm, q: Floats) -> Pose:
     """Poses of the base (0) and of the six link frames (1 to 6); joint i turns about z of i - 1.
 
     Parameters
@@ -120,9 +109,8 @@ def frames(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    position : array, shape (..., 7, 3)
-        mm.
-    rotation : array, shape (..., 7, 3, 3)
+    Pose
+        Of shape (..., 7).
     """
     theta = np.asarray(q, dtype=float) + arm.offset
     c, s = np.cos(theta), np.sin(theta)
@@ -139,4 +127,4 @@ def frames(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
         R = rotation[..., i, :, :]
         position[..., i + 1, :] = position[..., i, :] + np.matvec(R, step[..., i, :])
         rotation[..., i + 1, :, :] = R @ link[..., i, :, :]
-    return position, rotation
+    return Pose(position, rotation)

@@ -22,6 +22,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics.models import Arm
+from dmpcli.spatial.pose import Pose
 
 BRANCHES = 8
 
@@ -148,7 +149,7 @@ def solve(
     return q, np.where(np.isnan(q[..., 0]), np.maximum(missing, 0.0), 0.0)
 
 
-def nearest(arm: Arm, position: Floats, rotation: Floats, reference: Floats) -> Floats:
+def nearest(arm: Arm, flange: Pose, reference: Floats) -> Floats:
     """Joint angles for one pose, continuous with those before; for control loops.
 
     Of all branches, each joint turned by whole turns to the reference's side, the one nearest to
@@ -157,9 +158,8 @@ def nearest(arm: Arm, position: Floats, rotation: Floats, reference: Floats) -> 
     Parameters
     ----------
     arm : Arm
-    position : array, shape (3,)
-        Of the flange in the base frame, mm.
-    rotation : array, shape (3, 3)
+    flange : Pose
+        In the base frame.
     reference : array, shape (6,)
         The joint angles before, rad.
 
@@ -179,7 +179,7 @@ def nearest(arm: Arm, position: Floats, rotation: Floats, reference: Floats) -> 
     here = (reference + arm.offset).tolist()
     steps: list[float] = []
     least = math.inf
-    for phi in _each(g, position.tolist(), rotation.tolist(), here[5]):
+    for phi in _each(g, flange.position.tolist(), flange.rotation.tolist(), here[5]):
         way, away = [], 0.0
         for p, h in zip(phi, here, strict=True):
             step = math.remainder(p - h, _TURN)
@@ -190,7 +190,7 @@ def nearest(arm: Arm, position: Floats, rotation: Floats, reference: Floats) -> 
         else:
             steps, least = way, away
     if not steps:
-        raise RefusedError(why_not(arm, position, rotation))
+        raise RefusedError(why_not(arm, flange))
     best = [b + step for b, step in zip(before, steps, strict=True)]
     for joint, (angle, (low, high)) in enumerate(zip(best, arm.limits.tolist(), strict=True), 1):
         if not low - _SLACK <= angle <= high + _SLACK:
@@ -237,19 +237,11 @@ def _each(
                 yield f1, f2, f3, total - f2 - f3, f5, f6
 
 
-def why_not(arm: Arm, position: Floats, rotation: Floats) -> str:
-    """Say why a pose that has no solution is out of reach.
-
-    Parameters
-    ----------
-    arm : Arm
-    position : array, shape (3,)
-        mm.
-    rotation : array, shape (3, 3)
-    """
-    if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+def why_not(arm: Arm, flange: Pose) -> str:
+    """Say why a pose that has no solution is out of reach."""
+    if not (np.isfinite(flange.position).all() and np.isfinite(flange.rotation).all()):
         return "out of reach: the pose is not a number"
-    missing = float(solve(arm, position, rotation)[1].min())
+    missing = float(solve(arm, flange.position, flange.rotation)[1].min())
     return f"out of reach: the {arm.name} misses the pose by {missing:.2f} mm"
 
 

@@ -50,8 +50,8 @@ def matched(arm: Arm, axis: Floats, point: Floats, free: bool) -> Matched:
     free : bool
         Whether the lengths are the description's; else the arm's own.
     """
-    position, rotation = frames(arm, np.zeros(6))
-    own, position = rotation[:6, :, 2], position[:6]
+    link = frames(arm, np.zeros(6))
+    own, position = link.rotation[:6, :, 2], link.position[:6]
     U, _, Vt = np.linalg.svd(axis.T @ own)
     R: Floats = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
     along = own @ R.T
@@ -77,4 +77,4 @@ def _lengthened(arm: Arm, name: str, index: int) -> Floats:
     """Origins of the joints with one length a millimetre more, shape (6, 3)."""
     a, d = arm.a.copy(), arm.d.copy()
     (a if name == "a" else d)[index] += 1.0
-    return frames(replace(arm, a=a, d=d), np.zeros(6))[0][:6]
+    return frames(replace(arm, a=a, d=d), np.zeros(6)).position[:6]

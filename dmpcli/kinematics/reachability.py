@@ -16,7 +16,7 @@ from dmpcli.kinematics import chain, inverse, path
 from dmpcli.kinematics.models import Arm
 from dmpcli.kinematics.path import Followed, Peak
 from dmpcli.spatial.pose import Pose
-from dmpcli.spatial.rotations import exp, from_euler, log, smallest_between
+from dmpcli.spatial.rotations import exp, from_euler, smallest_between
 from dmpcli.spatial.wrench import Tool
 
 NEAR = 0.1
@@ -76,7 +76,8 @@ class Reach:
         start : array, shape (6,), optional
             Joint angles at the beginning, rad.
         """
-        return path.follow(self.arm, *self._flange(position, rotation), period, start)
+        flange = self._flange(Pose(position, rotation))
+        return path.follow(self.arm, flange.position, flange.rotation, period, start)
 
     def standing(self, joints: Floats | None, tcp: Pose) -> Floats | None:
         """Return the joint angles that a robot tells, once they agree with where its TCP is.
@@ -95,9 +96,9 @@ class Reach:
         """
         if joints is None:
             return None
-        p, R = self._flange(tcp.position, tcp.rotation)
-        ours, turned = chain.forward(self.arm, joints) if len(joints) == 6 else (np.inf, R)
-        away, angle = float(np.linalg.norm(ours - p)), float(np.linalg.norm(log(turned @ R.T)))
+        away, angle = np.inf, 0.0
+        if len(joints) == 6:
+            away, angle = self._flange(tcp).apart(chain.forward_one(self.arm, joints))
         if not (away <= _AGREE and angle <= _AGREE_ANGLE):
             raise RefusedError(
                 f"robot: by its joints the flange is {away:.1f} mm and {np.degrees(angle):.1f}° "
@@ -106,13 +107,12 @@ class Reach:
             )
         return joints
 
-    def _flange(self, position: Floats, rotation: Floats) -> tuple[Floats, Floats]:
+    def _flange(self, tcp: Pose) -> Pose:
         """Pose of the model's flange, in the model's base frame."""
-        if self.tool is not None:
-            position, rotation = self.tool.flange(position, rotation)
+        at = tcp if self.tool is None else self.tool.flange(tcp)
         base = exp(np.array([0.0, 0.0, self.base_turn]))
         flange = exp(np.array([0.0, 0.0, -self.flange_turn]))
-        return np.matvec(base, position), base @ rotation @ flange
+        return Pose(np.matvec(base, at.position), base @ at.rotation @ flange)
 
     def refusals(self, strokes: Sequence[ToolPath], rate: float) -> list[str]:
         """Say why each stroke cannot be followed, from whatever configuration is best.

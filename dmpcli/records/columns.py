@@ -17,6 +17,9 @@ TYPES = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
 LARGEST = 1e30
 """Numbers beyond this are no quantity in any unit, and their products would overflow."""
 
+FARTHEST = 1e6
+"""Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""
+
 
 def columns_of(
     table: Any, wanted: Mapping[str, Column], name: str, views: bool = False

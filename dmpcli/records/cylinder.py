@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dmpcli.records import directions, json_files
+from dmpcli.records.columns import FARTHEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.json_files import JsonPart
-from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.untrusted import decoder
 from dmpcli.surfaces.cylinder import Cylinder
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
+from dmpcli.records.columns import FARTHEST
 from dmpcli.records.file_io import Source
-from dmpcli.records.pairs import FARTHEST
 
 
 def near(source: Source, field: str, numbers: list[float]) -> Floats:

@@ -9,7 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.errors import InputError
 from dmpcli.records import pair_places, schemas, tables
-from dmpcli.records.columns import LARGEST
+from dmpcli.records.columns import FARTHEST, LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.pair_places import PairPlaces
 from dmpcli.records.schemas import OK
@@ -23,9 +23,6 @@ START_ANGLES = ("rx0", "ry0", "rz0")
 GOAL_ANGLES = ("rxg", "ryg", "rzg")
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
-
-FARTHEST = 1e6
-"""Coordinates beyond this, mm, are a mistake: no arm reaches a kilometre."""
 
 LARGEST_ANGLE = 1e3
 """Angles beyond this, rad, are a mistake."""

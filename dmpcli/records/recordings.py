@@ -24,10 +24,9 @@ from dmpcli.records import (
     trc,
     vicon,
 )
-from dmpcli.records.columns import all_within
+from dmpcli.records.columns import FARTHEST, all_within
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Layout, LayoutColumn
-from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
 from dmpcli.records.schemas import EULER_ANGLES
 from dmpcli.records.tables import HeadlessError, Table

@@ -10,13 +10,13 @@ from dmpcli.spatial import rotations
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame lies in another: x_there = R x_here + position; many have a leading axis.
+    """Where a frame lies in another: x_there = R x_here + position; many have leading axes.
 
     Attributes
     ----------
-    position : array, shape (3,) or (B, 3)
+    position : array, shape (..., 3)
         mm.
-    rotation : array, shape (3, 3) or (B, 3, 3)
+    rotation : array, shape (..., 3, 3)
         R.
     """
 

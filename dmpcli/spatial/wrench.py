@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import skew
 
 METRE = 1000.0
@@ -60,22 +61,10 @@ class Tool:
         """From the sensor's origin to the TCP, sensor axes, shape (3,), mm."""
         return self.sensor_rotation.T @ (self.tcp_position - self.sensor_position)
 
-    def flange(self, position: Floats, rotation: Floats) -> tuple[Floats, Floats]:
-        """Pose of the flange where the TCP has a pose.
-
-        Parameters
-        ----------
-        position : array, shape (..., 3)
-            Of the TCP, mm.
-        rotation : array, shape (..., 3, 3)
-
-        Returns
-        -------
-        position : array, shape (..., 3)
-        rotation : array, shape (..., 3, 3)
-        """
-        R = rotation @ self.tcp_rotation.T
-        return position - R @ self.tcp_position, R
+    def flange(self, tcp: Pose) -> Pose:
+        """Pose of the flange, or many, where the TCP has a pose."""
+        R = tcp.rotation @ self.tcp_rotation.T
+        return Pose(tcp.position - R @ self.tcp_position, R)
 
     def with_zero(self, zero: Floats | None) -> "Tool":
         """Return the same tool with another zero, shape (6,)."""

@@ -15,9 +15,9 @@ from dmpcli.formats.motion import MotionStroke
 from dmpcli.formats.pose_series import PoseBlocks
 from dmpcli.messages import tell
 from dmpcli.records import file_io, record, schemas, suffixes
+from dmpcli.records.columns import FARTHEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
-from dmpcli.records.pairs import FARTHEST
 from dmpcli.records.record import Provenance, Record, input_of
 from dmpcli.records.schemas import EULER_ANGLES, POSITION, WRENCH
 from dmpcli.settings.import_file import ImportOptions

@@ -17,9 +17,10 @@ from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.skill import Skill
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, learned_skill, record, recordings, schemas, suffixes
+from dmpcli.records.columns import FARTHEST
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.mesh_formats import looks_like_mesh
-from dmpcli.records.pairs import FARTHEST, PairTable
+from dmpcli.records.pairs import PairTable
 from dmpcli.records.schemas import OK
 from dmpcli.records.storage import Location, located
 from dmpcli.settings.batch import BatchOptions

@@ -21,7 +21,8 @@ pytestmark = needs(BENCH)
 @pytest.mark.parametrize("arm", ["ec66", "ur5e"])
 def test_it_stands_where_its_published_kinematics_say(arm):
     bench = world(Nothing(), arm=arm)
-    flange, rotation = chain.forward_one(bench.arm, bench.joints)
+    at = chain.forward_one(bench.arm, bench.joints)
+    flange, rotation = at.position, at.rotation
     tool = bench.parameters.tool
     np.testing.assert_allclose(
         bench.pose.position, flange + rotation @ tool.tcp_position, atol=1e-9
@@ -36,7 +37,8 @@ def test_mujocos_frames_are_those_of_the_kinematics_in_any_posture(arm):
     for q in rng.uniform(-2.5, 2.5, (20, 6)):
         bench._data.qpos[:6] = q
         bench._mujoco.mj_forward(bench._model, bench._data)
-        flange, rotation = chain.forward_one(bench.arm, q)
+        at = chain.forward_one(bench.arm, q)
+        flange, rotation = at.position, at.rotation
         tool = bench.parameters.tool
         np.testing.assert_allclose(
             bench.pose.position, flange + rotation @ tool.tcp_position, atol=1e-9
@@ -114,14 +116,14 @@ def test_a_load_bends_it_as_its_joints_stiffness_says():
     bench = world()
     press(bench, 3.0)
     J = jacobian(bench.arm, bench.joints)
-    flange, _ = chain.forward_one(bench.arm, bench.joints)
+    flange = chain.forward_one(bench.arm, bench.joints).position
     lever = bench.pose.position - flange
     # The TCP's rows, mm/rad; N·m/rad are 1000 N·mm/rad.
     rows = J[:3] + np.cross(J[3:].T, lever).T
     force = bench.contact_force
     bent = (rows / (1e3 * bench.parameters.servos.stiffness)) @ rows.T @ force
-    led, _ = chain.forward_one(bench.arm, bench.reference.position)
-    tip = led + chain.forward_one(bench.arm, bench.reference.position)[1] @ np.array([0, 0, 160.0])
+    led = chain.forward_one(bench.arm, bench.reference.position)
+    tip = led.position + led.rotation @ np.array([0, 0, 160.0])
     np.testing.assert_allclose(bench.pose.position - tip, bent, atol=0.01 * np.linalg.norm(bent))
     np.testing.assert_allclose(bench.compliance @ force, bent, rtol=1e-6, atol=1e-6)
 

@@ -15,6 +15,7 @@ from dmpcli.simulation.elite_server.workpiece import SpringWorkpiece, facing
 from dmpcli.simulation.mock import PEN, PEN_DOWN
 from dmpcli.simulation.mock.parameters import Plate, SensorParameters
 from dmpcli.spatial import wrench
+from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.sphere import Sphere
 from tests.extras_here import needs
@@ -32,7 +33,7 @@ def setting(**more):
 
 
 def joints_at(x=0.0, y=0.0, z=0.0):
-    return parked(model("ec66"), PEN, TIP + [x, y, z], PEN_DOWN)
+    return parked(model("ec66"), PEN, Pose(TIP + [x, y, z], PEN_DOWN))
 
 
 def led(arm, goal, seconds=1.0):

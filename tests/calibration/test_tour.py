@@ -148,7 +148,8 @@ def test_a_tool_outside_the_workspace_is_refused():
 def standing(joints):
     """An EC66 with the flange as its TCP, in a lab of the mock's."""
     arm = model("ec66")
-    position, rotation = chain.forward(arm, joints)
+    at = chain.forward(arm, joints)
+    position, rotation = at.position, at.rotation
     return Reach(arm), replace(Scene(), position=position, rotation=rotation, plate=None)
 
 

@@ -117,7 +117,8 @@ def test_a_run_leaves_with_the_joints_that_its_file_holds(files, tmp_path):
     held = record.decode(read_file(ran))
     assert held.provenance.facts["joints"] == {"arm": "ec66", "measured": False}
     q = held.stack([f"q{i}" for i in range(1, 7)])
-    place, turn = forward(model("ec66"), q)
+    at = forward(model("ec66"), q)
+    place, turn = at.position, at.rotation
     np.testing.assert_allclose(place, held.position(), atol=1e-6)
     np.testing.assert_allclose(turn, held.rotation(), atol=1e-8)
     done = run("export", ran, "-o", tmp_path / "o.joints.csv")

@@ -53,7 +53,8 @@ def test_a_pair_that_passes_can_be_followed_by_the_chain_itself(learned, tmp_pat
     drawn = read(tmp_path / "t")
     arm = models.model("ec66")
     q = Reach(arm).follow(drawn.position()[None], drawn.rotation()[None], 0.02).joints[0]
-    position, rotation = chain.forward(arm, q)
+    at = chain.forward(arm, q)
+    position, rotation = at.position, at.rotation
     assert np.abs(position - drawn.position()).max() < 1e-9
     assert np.abs(rotation - drawn.rotation()).max() < 1e-9
     assert (np.abs(np.diff(q, axis=0)) / 0.02 <= arm.speeds).all()

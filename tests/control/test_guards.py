@@ -41,10 +41,10 @@ def test_another_may_not(bad, error, words):
 
 
 def test_only_a_pose_inside_is_sent():
-    guards.check_setpoint(PLACE, LEVEL, BOX)
+    guards.check_setpoint(Pose(PLACE, LEVEL), BOX)
     for position, rotation in ((NAN, LEVEL), (PLACE, LEVEL * np.nan), (2 * PLACE, LEVEL)):
         with pytest.raises(RefusedError, match="next set-point"):
-            guards.check_setpoint(position, rotation, BOX)
+            guards.check_setpoint(Pose(position, rotation), BOX)
 
 
 def test_a_period_out_of_the_robots_range_is_the_users_mistake():

@@ -335,7 +335,8 @@ def _positions(bench: Bench) -> tuple[Floats, Floats]:
     if not bench.sent:
         return np.zeros(0), np.zeros((0, 3))
     joints = np.array([joints for _, joints in bench.sent])
-    position, rotation = chain.forward(model(ROBOT_MODEL), joints)
+    at = chain.forward(model(ROBOT_MODEL), joints)
+    position, rotation = at.position, at.rotation
     return np.array([t for t, _ in bench.sent]), position + rotation @ PEN.tcp_position
 
 

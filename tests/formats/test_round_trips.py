@@ -108,7 +108,8 @@ def imported(there, near):
 
 def joints(there):
     rows = np.loadtxt(there, delimiter=",", skiprows=1)
-    return rows[:, 0], *forward(model("ec66"), rows[:, 1:])
+    at = forward(model("ec66"), rows[:, 1:])
+    return rows[:, 0], at.position, at.rotation
 
 
 def ply(there):

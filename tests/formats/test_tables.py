@@ -71,7 +71,8 @@ def arm_stroke():
     arm = models.model("ec66")
     s = np.linspace(0.0, 1.0, 101)[:, None]
     q = np.array([0.1, 2.2, 1.5, -2.1, -1.5, 1.4]) + 0.2 * s * np.array([1, -1, 0.5, 1, 0.3, -1])
-    position, R = chain.forward(arm, q)
+    at = chain.forward(arm, q)
+    position, R = at.position, at.rotation
     return arm, q, Motion("arm", "trajectory", [MotionStroke(4.0 * s[:, 0], position, R)])
 
 
@@ -82,7 +83,7 @@ def test_joints_lead_the_arm_along_the_stroke():
     head, *rows = joint_table.encode(found).decode().splitlines()
     assert head == "t [s],q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad]"
     values = np.array([row.split(",") for row in rows], dtype=float)
-    position, _ = chain.forward(arm, values[:, 1:])
+    position = chain.forward(arm, values[:, 1:]).position
     np.testing.assert_allclose(position, given.strokes[0].position, atol=1e-6)
 
 

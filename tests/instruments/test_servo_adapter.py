@@ -78,7 +78,8 @@ class Brand:
 
     @property
     def pose_now(self):
-        position, rotation = chain.forward(ARM, self.joints)
+        at = chain.forward(ARM, self.joints)
+        position, rotation = at.position, at.rotation
         if self.tool is not None:
             position = position + rotation @ self.tool.tcp_position
             rotation = rotation @ self.tool.tcp_rotation
@@ -186,7 +187,8 @@ def test_joint_set_points_bring_the_tools_tip_to_the_pose():
     servo = opened(driver, PEN)
     servo.start(0.02)
     state = servo.state()
-    position, rotation = chain.forward(ARM, HOME)
+    at = chain.forward(ARM, HOME)
+    position, rotation = at.position, at.rotation
     np.testing.assert_allclose(state.position, position + rotation @ PEN.tcp_position)
     np.testing.assert_allclose(state.rotation, rotation @ PEN.tcp_rotation, atol=1e-12)
     np.testing.assert_allclose(state.joints, HOME)
@@ -270,7 +272,7 @@ class Solver(Brand):
     def inverse(self, pose, near):
         self.questions.append(pose)
         goal = pose_forms.decode(self.meant, pose)
-        joints = inverse.nearest(ARM, goal.position, goal.rotation, np.radians(near))
+        joints = inverse.nearest(ARM, goal, np.radians(near))
         return None if self.error is None else np.degrees(joints + self.error)
 
 
@@ -366,7 +368,7 @@ def test_a_whole_plan_is_handed_over_in_the_drivers_units():
     servo.upload(position, rotation, 0.02)
     targets, period = driver.plan
     assert period == 0.02
-    reached, _ = chain.forward(ARM, np.radians(targets))
+    reached = chain.forward(ARM, np.radians(targets)).position
     np.testing.assert_allclose(reached, position, atol=1e-6)
     servo.play()
     assert driver.calls == ["play"]

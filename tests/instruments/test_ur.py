@@ -384,7 +384,8 @@ def test_it_can_be_stopped_while_a_call_hangs(started, dashboard):
 def standing(fakes, monkeypatch, offset):
     """A UR5e whose TCP is set `offset` mm beyond its flange."""
     arm = models.model("ur5e")
-    position, rotation = chain.forward(arm, np.array(JOINTS))
+    at = chain.forward(arm, np.array(JOINTS))
+    position, rotation = at.position, at.rotation
     tip = (position + rotation @ [0.0, 0.0, offset]) / 1000.0
     pose = [*tip, *log(rotation)]
     monkeypatch.setattr(FakeReceive, "getActualTCPPose", lambda self: pose)

@@ -23,7 +23,8 @@ def jacobian(arm: Arm, q: Floats) -> Floats:
     array, shape (..., 6, 6)
         Rows 0-2 in mm/rad, rows 3-5 in rad/rad.
     """
-    position, rotation = chain.frames(arm, q)
+    at = chain.frames(arm, q)
+    position, rotation = at.position, at.rotation
     axis = rotation[..., :6, :, 2]
     lever = position[..., 6:, :] - position[..., :6, :]
     return np.swapaxes(np.concatenate([np.cross(axis, lever), axis], axis=-1), -1, -2)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics import chain, inverse, models
+from dmpcli.spatial.pose import Pose
 from tests.kinematics.jacobian import jacobian
 
 EC66 = models.model("ec66")
@@ -22,7 +23,8 @@ def turned(a, b):
 
 
 def missed(position, rotation, q):
-    p, R = chain.forward(EC66, q)
+    at = chain.forward(EC66, q)
+    p, R = at.position, at.rotation
     return np.concatenate([p - position, 100.0 * (R - rotation).ravel()])
 
 
@@ -40,15 +42,16 @@ def searched(position, rotation, starts=24):
 @pytest.mark.slow
 def test_every_solution_of_ten_thousand_poses_leads_back_to_its_pose():
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (10_000, 6))
-    position, rotation = chain.forward(EC66, q)
+    at = chain.forward(EC66, q)
+    position, rotation = at.position, at.rotation
     found = inverse.solve(EC66, position, rotation)[0]
     exists = ~np.isnan(found[..., 0])
     assert found.shape == (10_000, 8, 6)
     assert np.array_equal(exists, ~np.isnan(found).any(axis=-1))
     assert np.bincount(exists.sum(axis=1))[8] > 7000
     back = chain.forward(EC66, found)
-    assert np.nanmax(np.abs(back[0] - position[:, None])) < 1e-9
-    assert np.nanmax(np.abs(back[1] - rotation[:, None])) < 1e-12
+    assert np.nanmax(np.abs(back.position - position[:, None])) < 1e-9
+    assert np.nanmax(np.abs(back.rotation - rotation[:, None])) < 1e-12
     # The configuration that the pose came from is one of them, and all of them differ.
     away = turned(found, q[:, None])
     assert np.nanmin(away, axis=1).max() < 1e-9
@@ -59,7 +62,8 @@ def test_every_solution_of_ten_thousand_poses_leads_back_to_its_pose():
 
 def test_solutions_are_angles_within_half_a_turn():
     q = np.random.default_rng(2).uniform(-6, 6, (500, 6))
-    found = inverse.solve(EC66, *chain.forward(EC66, q))[0]
+    at = chain.forward(EC66, q)
+    found = inverse.solve(EC66, at.position, at.rotation)[0]
     assert np.nanmax(found) <= np.pi
     assert np.nanmin(found) > -np.pi
 
@@ -99,7 +103,7 @@ def test_too_near_to_the_first_axis_is_out_of_reach():
     assert np.isnan(found).all()
     assert missing.min() == pytest.approx(122 - np.hypot(60, 60))
     with pytest.raises(RefusedError, match=r"^out of reach: the ec66 misses the pose by 37\.15 mm"):
-        inverse.nearest(EC66, at, DOWN, np.zeros(6))
+        inverse.nearest(EC66, Pose(at, DOWN), np.zeros(6))
 
 
 @pytest.mark.slow
@@ -107,13 +111,14 @@ def test_too_near_to_the_first_axis_is_out_of_reach():
 @example(np.array([2e-05, 0.998046875, 2e-05, 0.125, 2e-05, 0.0]))
 @given(ANGLES)
 def test_the_scalar_way_finds_what_the_array_way_finds(q):
-    position, rotation = chain.forward(EC66, q)
+    at = chain.forward(EC66, q)
+    position, rotation = at.position, at.rotation
     found = inverse.solve(EC66, position, rotation)[0]
     reference = np.clip(q, EC66.limits[:, 0] / 2, EC66.limits[:, 1] / 2)
     measure = inverse.singularity(EC66, q)
     if measure.min() < 1e-6 or abs(q[2]) > np.radians(160):
         return
-    one = inverse.nearest(EC66, position, rotation, reference)
+    one = inverse.nearest(EC66, Pose(position, rotation), reference)
     # Near a singularity the angles are worth less: an error of the pose is divided by its measure,
     # and near two of them by both.
     slack = 1e-8 + 1e-11 / measure.min() + 1e-15 / np.prod(np.sort(measure)[:2])
@@ -131,7 +136,7 @@ def test_turns_follow_the_reference(q, turns, joint):
     reference[joint] += turns * 2 * np.pi
     if abs(reference[joint]) > 2 * np.pi:
         return
-    found = inverse.nearest(EC66, *chain.forward(EC66, q), reference)
+    found = inverse.nearest(EC66, chain.forward(EC66, q), reference)
     assert found == pytest.approx(reference, abs=1e-6)
 
 
@@ -140,24 +145,26 @@ def test_a_joint_that_would_turn_past_its_limit_is_named():
     reference = np.array([0.3, -1.2, 1.0, -1.0, 1.2, limit - 0.01])
     ahead = reference + [0, 0, 0, 0, 0, 0.02]
     with pytest.raises(RefusedError, match=r"joint 6 would turn to 360\.57°, beyond -360° to 360°"):
-        inverse.nearest(EC66, *chain.forward(EC66, ahead), reference)
+        inverse.nearest(EC66, chain.forward(EC66, ahead), reference)
     on_it = reference + [0, 0, 0, 0, 0, 0.01]
-    assert inverse.nearest(EC66, *chain.forward(EC66, on_it), reference) == pytest.approx(on_it)
+    assert inverse.nearest(EC66, chain.forward(EC66, on_it), reference) == pytest.approx(on_it)
 
 
 def test_a_pose_that_is_not_a_number_is_refused():
     with pytest.raises(RefusedError, match="not a number"):
-        inverse.nearest(EC66, np.array([np.nan, 0, 0]), DOWN, np.zeros(6))
+        inverse.nearest(EC66, Pose(np.array([np.nan, 0, 0]), DOWN), np.zeros(6))
     with pytest.raises(RefusedError, match="not a number"):
-        inverse.nearest(EC66, np.array([500.0, 0, 300]), np.full((3, 3), np.nan), np.zeros(6))
+        inverse.nearest(EC66, Pose(np.array([500.0, 0, 300]), np.full((3, 3), np.nan)), np.zeros(6))
 
 
 def test_with_axes_4_and_6_in_line_joint_6_stays_and_the_pose_is_kept():
     q = np.array([0.4, -1.1, 1.3, 0.5, -np.pi, 0.7])  # joint 5: offset 180°, so its sine is zero
-    position, rotation = chain.forward(EC66, q)
+    at = chain.forward(EC66, q)
+    position, rotation = at.position, at.rotation
     assert inverse.singularity(EC66, q)[2] < 1e-12
-    found = inverse.nearest(EC66, position, rotation, q + 0.05)
-    p, R = chain.forward(EC66, found)
+    found = inverse.nearest(EC66, Pose(position, rotation), q + 0.05)
+    at = chain.forward(EC66, found)
+    p, R = at.position, at.rotation
     assert p == pytest.approx(position, abs=1e-9)
     assert np.abs(R - rotation).max() < 1e-12
     assert np.abs(found - q).max() < 0.11
@@ -194,11 +201,12 @@ def test_an_arm_of_the_family_with_other_signs_is_solved_too():
         offset=np.zeros(6),
     )
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (1000, 6))
-    position, rotation = chain.forward(ur5e, q)
+    at = chain.forward(ur5e, q)
+    position, rotation = at.position, at.rotation
     found = inverse.solve(ur5e, position, rotation)[0]
-    assert np.nanmax(np.abs(chain.forward(ur5e, found)[0] - position[:, None])) < 1e-9
+    assert np.nanmax(np.abs(chain.forward(ur5e, found).position - position[:, None])) < 1e-9
     assert np.nanmin(turned(found, q[:, None]), axis=1).max() < 1e-8
-    one = inverse.nearest(ur5e, position[0], rotation[0], q[0])
+    one = inverse.nearest(ur5e, Pose(position[0], rotation[0]), q[0])
     assert one == pytest.approx(q[0], abs=1e-8)
 
 

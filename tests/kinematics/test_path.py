@@ -19,7 +19,8 @@ def swept(*ends, samples=101):
 
 
 def followed(q, start=None, arm=EC66, period=PERIOD):
-    position, rotation = chain.forward(EC66, q)
+    at = chain.forward(EC66, q)
+    position, rotation = at.position, at.rotation
     return path.follow(arm, position[None], rotation[None], period, start)
 
 
@@ -46,8 +47,8 @@ def test_all_samples_lead_back_to_the_path():
     position, rotation = pen(line([450, -250, 100], [550, 300, 250]))
     found = path.follow(EC66, position, rotation, PERIOD)
     back = chain.forward(EC66, found.joints)
-    assert np.abs(back[0] - position).max() < 1e-9
-    assert np.abs(back[1] - rotation).max() < 1e-12
+    assert np.abs(back.position - position).max() < 1e-9
+    assert np.abs(back.rotation - rotation).max() < 1e-12
     assert np.abs(np.diff(found.joints, axis=1)).max() < 0.05
 
 
@@ -62,7 +63,8 @@ def test_through_the_wrist_singularity_the_branch_that_goes_on_is_taken(samples)
     assert not found.jumps.any()
     assert found.joints[0] == pytest.approx(q, abs=0.01)
     # The branch of the start's number would jump by about half a turn there.
-    numbered = inverse.solve(EC66, *chain.forward(EC66, q))[0]
+    way = chain.forward(EC66, q)
+    numbered = inverse.solve(EC66, way.position, way.rotation)[0]
     apart = np.abs((numbered[0] - before + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
     own = np.unwrap(numbered[:, np.nanargmin(apart)], axis=0)
     assert np.nanmax(np.abs(np.diff(own, axis=0))) > 1.0
@@ -117,7 +119,8 @@ def test_another_branch_is_found_where_the_one_of_the_start_leaves_the_limits():
 def test_the_branch_that_is_taken_has_the_largest_margin_of_all_eight():
     q = swept(PLAIN, PLAIN + [0.2, 0.1, -0.1, 0.1, 0.1, 0.1])
     free = followed(q)
-    starts = inverse.solve(EC66, *chain.forward(EC66, q[0]))[0]
+    first = chain.forward(EC66, q[0])
+    starts = inverse.solve(EC66, first.position, first.rotation)[0]
     margins = [followed(q, s).margin[0] for s in starts if not np.isnan(s[0])]
     assert np.isfinite(margins).sum() >= 4
     assert free.margin[0] >= np.nanmax(margins) - 1e-9
@@ -158,7 +161,8 @@ def test_near_the_wrist_singularity_the_speed_grows_and_the_singularity_is_told(
     # Past sin φ5 = 0 at 0.02: joints 4 and 6 have to swing round.
     before = PLAIN.copy()
     before[4] = -np.pi + 0.02
-    position, rotation = chain.forward(EC66, before)
+    at = chain.forward(EC66, before)
+    position, rotation = at.position, at.rotation
     track = position + line([-100, 0, 0], [100, 0, 0], 301)
     found = path.follow(EC66, track[None], np.broadcast_to(rotation, (1, 301, 3, 3)), 0.004, before)
     assert found.nearness.shape == (1, 3)
@@ -192,8 +196,8 @@ def test_reach_agrees_with_a_search_near_the_boundary():
         reached = bool(found.missing.passed[0])
 
         def missed(q, at=at):
-            p, R = chain.forward(EC66, q)
-            return np.concatenate([p - at, 100.0 * (R - DOWN).ravel()])
+            flange = chain.forward(EC66, q)
+            return np.concatenate([flange.position - at, 100.0 * (flange.rotation - DOWN).ravel()])
 
         best = min(least_squares(missed, rng.uniform(-np.pi, np.pi, 6)).cost for _ in range(12))
         assert reached == (best < 1e-4)
@@ -235,8 +239,8 @@ def test_the_whole_path_is_what_the_loops_solver_finds_sample_by_sample():
             continue
         found = followed(q, start)
         now = start
-        for p, R, joints in zip(*chain.forward(EC66, q), found.joints[0], strict=True):
-            now = inverse.nearest(EC66, p, R, now)
+        for way, joints in zip(q, found.joints[0], strict=True):
+            now = inverse.nearest(EC66, chain.forward(EC66, way), now)
             assert joints == pytest.approx(now, abs=1e-8)
         compared += 1
     assert compared > 10

@@ -79,7 +79,8 @@ def test_the_tool_moves_what_can_be_reached():
 @pytest.mark.parametrize("flange_turn", [0.0, np.pi / 2])
 def test_the_joints_that_a_robot_tells_are_believed_only_where_its_tcp_is(base_turn, flange_turn):
     # The TCP composed from the chain, not taken apart as the code does.
-    p, R = chain.forward(EC66, Q)
+    at = chain.forward(EC66, Q)
+    p, R = at.position, at.rotation
     base, flange = exp(np.array([0, 0, -base_turn])), exp(np.array([0, 0, flange_turn]))
     attitude_of_flange = base @ R @ flange
     position = base @ p + attitude_of_flange @ PEN.tcp_position
@@ -97,7 +98,8 @@ def test_the_joints_that_a_robot_tells_are_believed_only_where_its_tcp_is(base_t
 
 
 def test_the_stroke_of_a_start_is_followed_from_that_start():
-    position, rotation = chain.forward(EC66, Q + np.linspace(0, 0.3, 30)[:, None])
+    at = chain.forward(EC66, Q + np.linspace(0, 0.3, 30)[:, None])
+    position, rotation = at.position, at.rotation
     found = Reach(EC66).follow(position[None], rotation[None], 0.02, Q)
     assert found.joints[0, -1] == pytest.approx(Q + 0.3, abs=1e-9)
 

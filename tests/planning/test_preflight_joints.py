@@ -37,7 +37,8 @@ def test_the_papers_stroke_is_within_an_ec66s_joints():
     assert [c.unit for c in checks] == ["mm", "°", "°/s"]
     assert all(c.passed for c in checks)
     assert checks[2].limit in (150, 190, pytest.approx(260))
-    position, rotation = chain.forward(EC66, after)
+    at = chain.forward(EC66, after)
+    position, rotation = at.position, at.rotation
     assert position == pytest.approx(made.position[-1], abs=1e-9)
     assert rotation == pytest.approx(made.rotation[-1], abs=1e-12)
 

@@ -22,6 +22,7 @@ from dmpcli.simulation.elite_server.parameters import (
     pose_row,
 )
 from dmpcli.simulation.elite_server.trajectory_file import TrajectoryFile
+from dmpcli.spatial.pose import Pose
 
 STOP, PAUSE, ESTOP, PLAY, ERROR, COLLISION = range(6)
 """What getRobotState answers."""
@@ -281,21 +282,16 @@ class SimulatedController:
 
     def _forward(self, params: Params) -> list[float]:
         degrees = params.choice("unit_type", (0, 1), 1) == 0
-        position, rotation = chain.forward(self.arm.model, params.joints("targetPos"))
-        tool = self.arm.tool
-        tip = position + rotation @ tool.tcp_position
-        return _plain(pose_row(tip, rotation @ tool.tcp_rotation, self.habits.euler, degrees))
+        flange = chain.forward(self.arm.model, params.joints("targetPos"))
+        tcp = flange @ Pose(self.arm.tool.tcp_position, self.arm.tool.tcp_rotation)
+        return _plain(pose_row(tcp.position, tcp.rotation, self.habits.euler, degrees))
 
     def _joints_of_pose(
         self, params: Params, name: str, near: Floats, degrees: bool = False
     ) -> Floats:
-        position, rotation = params.pose(name, degrees, self.habits.euler)
-        tool = self.arm.tool
-        flange = rotation @ tool.tcp_rotation.T
+        flange = self.arm.tool.flange(params.pose(name, degrees, self.habits.euler))
         try:
-            return inverse.nearest(
-                self.arm.model, position - flange @ tool.tcp_position, flange, near
-            )
+            return inverse.nearest(self.arm.model, flange, near)
         except RefusedError as error:
             raise RpcError(FAILED, str(error)) from None
 

@@ -137,7 +137,8 @@ class JointArm:
     def posture(self) -> Posture:
         """Where flange and TCP are now."""
         reach = self.tool.tcp_position
-        p, R, velocity = chain.forward_moving(self.model, self.joints, self.speeds, reach)
+        flange, velocity = chain.forward_moving(self.model, self.joints, self.speeds, reach)
+        p, R = flange.position, flange.rotation
         tip = p + R @ reach
         return Posture(p, R, tip, R @ self.tool.tcp_rotation, velocity)
 

@@ -23,6 +23,7 @@ from dmpcli.simulation.elite_server.joint_arm import LAG, FeelingArm, JointArm
 from dmpcli.simulation.elite_server.visiting_hand import VisitingHand
 from dmpcli.simulation.mock.contact import Solid, Wrist, contact
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN, SensorParameters
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.wrench import Tool
 
 ROBOT_MODEL = "ec66"
@@ -68,7 +69,7 @@ class LabParameters:
     physics: "Callable[[LabParameters, Floats], FeelingArm] | None" = None
 
 
-def parked(arm: Arm, tool: Tool, position: Floats, rotation: Floats) -> Floats:
+def parked(arm: Arm, tool: Tool, tcp: Pose) -> Floats:
     """Joint angles, shape (6,), rad, that bring the TCP to a pose.
 
     Raises
@@ -76,8 +77,7 @@ def parked(arm: Arm, tool: Tool, position: Floats, rotation: Floats) -> Floats:
     RefusedError
         The pose is out of reach, or beyond a joint's limit.
     """
-    flange = rotation @ tool.tcp_rotation.T
-    return inverse.nearest(arm, position - flange @ tool.tcp_position, flange, READY)
+    return inverse.nearest(arm, tool.flange(tcp), READY)
 
 
 class VirtualLab:
@@ -111,7 +111,7 @@ class VirtualLab:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         arm = model(ROBOT_MODEL)
-        joints = parked(arm, setting.tool, setting.position, setting.rotation)
+        joints = parked(arm, setting.tool, Pose(setting.position, setting.rotation))
         if setting.physics is None:
             moved = JointArm(arm, setting.tool, joints, setting.lag)
         else:

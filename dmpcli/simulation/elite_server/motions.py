@@ -13,6 +13,7 @@ from dmpcli.errors import RefusedError
 from dmpcli.kinematics import chain, inverse
 from dmpcli.kinematics.models import Arm
 from dmpcli.simulation.elite_server.joint_arm import Leg
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp_one, log_one
 
 Underrun = Literal["hold", "decelerate", "alarm"]
@@ -218,7 +219,8 @@ def line_move(
     RefusedError
         A point on the way is out of reach, or there is no motion of the kind that the speed is of.
     """
-    (p0, p1), (R0, R1) = chain.forward(arm, np.stack([start, goal]))
+    ends = chain.forward(arm, np.stack([start, goal]))
+    (p0, p1), (R0, R1) = ends.position, ends.rotation
     turn = log_one(R1 @ R0.T)
     size = float(np.linalg.norm(turn if turning else p1 - p0))
     if size < _ROUNDING:
@@ -226,7 +228,8 @@ def line_move(
     times, share = trapezoid(speed / size, acceleration / size)
     joints = [start]
     for s in share[1:]:
-        joints.append(inverse.nearest(arm, p0 + s * (p1 - p0), exp_one(s * turn) @ R0, joints[-1]))
+        flange = Pose(p0 + s * (p1 - p0), exp_one(s * turn) @ R0)
+        joints.append(inverse.nearest(arm, flange, joints[-1]))
     return JointPath(times, np.array(joints), arm.speeds)
 
 

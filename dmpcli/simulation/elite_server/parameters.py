@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import from_euler, to_euler, to_euler_one
 
 Euler = Literal["xyz", "zyx"]
@@ -78,8 +79,8 @@ class Params:
         """
         return np.radians(self._row(name, (6, 8))[:6])
 
-    def pose(self, name: str, degrees: bool, euler: Euler) -> tuple[Floats, Floats]:
-        """Return a position, mm, and a rotation matrix.
+    def pose(self, name: str, degrees: bool, euler: Euler) -> Pose:
+        """Return a pose of a position in mm and three angles.
 
         Raises
         ------
@@ -87,7 +88,7 @@ class Params:
         """
         row = self._row(name, (6,))
         angles = np.radians(row[3:]) if degrees else row[3:]
-        return row[:3], matrix(angles, euler)
+        return Pose(row[:3], matrix(angles, euler))
 
     def _row(self, name: str, lengths: tuple[int, ...]) -> Floats:
         row = self._given.get(name)

@@ -5,16 +5,13 @@ from dmpcli.control import workcell
 from dmpcli.instruments.clock import MonotonicClock
 from dmpcli.instruments.pose_forms import encode
 from dmpcli.kinematics import chain, models
-from dmpcli.spatial.pose import Pose
 from tests.instruments.elite.scripted import HOME, Scripted
 from tests.instruments.test_servo_adapter import declared
 
 
 def flange_at(joints):
     """What an EC66 without a tool reports at joint angles in degrees: mm and degrees."""
-    return encode(
-        declared(), Pose(*chain.forward(models.model("ec66"), np.radians(joints)))
-    ).tolist()
+    return encode(declared(), chain.forward(models.model("ec66"), np.radians(joints))).tolist()
 
 
 @pytest.fixture

@@ -114,9 +114,7 @@ class Scripted:
         """The kinematics of an EC66 without a tool."""
         goal = pose_forms.decode(declared(), np.array(params["targetPose"]))
         near = np.radians(params["referencePos"])
-        return np.degrees(
-            inverse.nearest(models.model("ec66"), goal.position, goal.rotation, near)
-        ).tolist()
+        return np.degrees(inverse.nearest(models.model("ec66"), goal, near)).tolist()
 
     def methods(self):
         return [method for method, _ in self.asked]

@@ -105,7 +105,8 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     assert set(columns["state"]) == {"ready"}
     # The joints of each row are those that its pose was made of.
     joints = np.column_stack([columns[f"q{i}"] for i in range(1, 7)])
-    flange, turned = chain.forward(models.model("ec66"), joints)
+    at = chain.forward(models.model("ec66"), joints)
+    flange, turned = at.position, at.rotation
     np.testing.assert_allclose(flange + turned @ PEN.tcp_position, actual, atol=1e-6)
 
 

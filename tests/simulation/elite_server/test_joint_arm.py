@@ -6,6 +6,7 @@ from dmpcli.kinematics.models import model
 from dmpcli.simulation.elite_server.joint_arm import JointArm
 from dmpcli.simulation.elite_server.lab import parked
 from dmpcli.simulation.mock.parameters import PEN, PEN_DOWN
+from dmpcli.spatial.pose import Pose
 
 EC66 = model("ec66")
 # Start and goal of the paper's stroke, mm.
@@ -13,12 +14,12 @@ POINTS = ((-551.030, 131.399, -17.560), (-660.021, 130.034, -17.538))
 
 
 def arm(lag: float = 0.0) -> JointArm:
-    return JointArm(EC66, PEN, parked(EC66, PEN, np.array(POINTS[0]), PEN_DOWN), lag)
+    return JointArm(EC66, PEN, parked(EC66, PEN, Pose(np.array(POINTS[0]), PEN_DOWN)), lag)
 
 
 @pytest.mark.parametrize("point", POINTS)
 def test_the_parked_pen_stands_upright_on_the_papers_points(point):
-    joints = parked(EC66, PEN, np.array(point), PEN_DOWN)
+    joints = parked(EC66, PEN, Pose(np.array(point), PEN_DOWN))
     at = JointArm(EC66, PEN, joints).posture
     np.testing.assert_allclose(at.position, point, atol=1e-9)
     np.testing.assert_allclose(at.rotation, Rotation.from_euler("x", np.pi).as_matrix(), atol=1e-12)
@@ -29,7 +30,7 @@ def test_the_parked_pen_stands_upright_on_the_papers_points(point):
 def test_the_parked_elbow_is_above_the_table():
     from dmpcli.kinematics import chain
 
-    origins, _ = chain.frames(EC66, arm().joints)
+    origins = chain.frames(EC66, arm().joints).position
     assert origins[1:, 2].min() > 90.0
 
 

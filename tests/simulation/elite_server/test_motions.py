@@ -185,8 +185,10 @@ def test_a_joint_move_keeps_every_joints_speed_and_arrives():
 def test_a_line_move_keeps_the_flange_on_the_line_at_its_speed():
     goal = BENT + np.radians([12.0, 4.0, -6.0, 2.0, 0.0, 12.0])
     times, joints = drive(line_move(EC66, BENT, goal, 100.0, 500.0, turning=False), BENT)
-    positions, rotations = chain.forward(EC66, joints)
-    end, turned = chain.forward(EC66, goal)
+    at = chain.forward(EC66, joints)
+    positions, rotations = at.position, at.rotation
+    at = chain.forward(EC66, goal)
+    end, turned = at.position, at.rotation
     along = (end - positions[0]) / np.linalg.norm(end - positions[0])
     off = (positions - positions[0]) - np.outer((positions - positions[0]) @ along, along)
     assert np.abs(off).max() < 1e-6
