@@ -170,6 +170,7 @@ def test_pairs_drawn_together_equal_pairs_drawn_alone(skill):
         np.testing.assert_allclose(stroke.euler, alone.euler, atol=1e-12)
 
 
+@pytest.mark.sweep(kept=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("orientation", ["keep", "surface"])
 @pytest.mark.parametrize("asked", [False, True])

@@ -13,7 +13,7 @@ from tests.surfaces.judge import Judge, traced
 from tests.surfaces.test_borders import patch_with_hole, roll, unrolled_strokes
 from tests.surfaces.test_slits import plate_with_fin
 
-pytestmark = [needs(extras.FAST), pytest.mark.slow]
+pytestmark = [needs(extras.FAST), pytest.mark.thorough]
 
 # Of positions, mm, and axes, rad: what rounding comes to.
 ALIKE = 1e-11

@@ -87,7 +87,7 @@ def test_positions_far_off_the_mesh_are_left_to_the_search(bumpy):
     np.testing.assert_allclose(invert(charts, drawn.position).coordinates, wanted, atol=2e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facets(ball):
     charts = laid(ball, headings=2, half=40.0, top=95.0)
     drawn = charts.lift(wave(charts, wide=12.0)).position
@@ -123,7 +123,7 @@ def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkey
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
 @pytest.mark.parametrize("wide", [0.0, 4.0, 25.0])
 def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
@@ -143,7 +143,7 @@ def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_kernels_find_a_stroke_alike_alone_and_among_others(bumpy):
     charts = laid(bumpy.with_kernels)
     position = charts.lift(wave(charts)).position
@@ -155,7 +155,7 @@ def test_kernels_find_a_stroke_alike_alone_and_among_others(bumpy):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["drilled", "ribbed", "cone", "filleted"])
 def test_kernels_tell_alike_what_has_no_place_on_parts_with_edges(name):
     mesh = zoo.mesh(name)
@@ -177,7 +177,7 @@ def test_kernels_tell_alike_what_has_no_place_on_parts_with_edges(name):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_kernels_find_the_closest_points_of_paths(bumpy):
     rng = np.random.default_rng(2)
     charts = laid(bumpy)
