@@ -233,7 +233,9 @@ def written(output, *words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("means", ["pure", pytest.param("compiled", marks=[needs(extras.FAST), pytest.mark.thorough])])
+@pytest.mark.parametrize(
+    "means", ["pure", pytest.param("compiled", marks=[needs(extras.FAST), pytest.mark.thorough])]
+)
 def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder, means):
     one, two = (
         written(tmp_path / f"jobs-{jobs}", demo, folder, "--jobs", jobs, "--kernels", means)
