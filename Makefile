@@ -66,21 +66,21 @@ setup: $(VENV)/installed
 # kernels, which compile for a minute, clusters and laboratories in real time, and of sweeps all
 # cases but a few. A file's tests stay in one process, so that what they share is made once. Lint and
 # types are looked at meanwhile: some tests wait in real time, and mypy is one process. For the same
-# reason there are two processes to a core, and of the quick half, which waits little, three to two.
-# WORKERS=N chooses. In a clone that is new the asserts of all tests are made ready by one process
-# first, not by each.
+# reason there are three processes to two cores, and of the thorough, which wait most, four; WORKERS=N
+# chooses. In a clone that is new one process makes the asserts of all tests ready, not each.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest
 MANY  := --dist loadfile --no-loadscope-reorder --numprocesses
+MORE  := $(MANY) $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2))
 TWICE := $(MANY) $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
-QUICK := $(MANY) $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2)) -m "not slow and not thorough"
+QUICK := $(MORE) -m "not slow and not thorough"
 
 test: $(VENV)/installed
 	@mkdir -p $(OUT)
 	@nice -n 5 $(MAKE) --no-print-directory lint > $(OUT)/lint.log 2>&1 & lint=$$!; \
 	    [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }; \
-	    $(PYTEST) $(TWICE) -m "not thorough"; tests=$$?; wait $$lint; linted=$$?; \
+	    $(PYTEST) $(MORE) -m "not thorough"; tests=$$?; wait $$lint; linted=$$?; \
 	    cat $(OUT)/lint.log; exit $$((tests | linted))
 
 test-quick: $(VENV)/installed

@@ -207,7 +207,7 @@ def test_a_skill_that_is_not_the_stroke_is_said_so_even_when_quiet(in_process):
     assert in_process("fit", REFERENCE, "-o", "s.json", "-q").stderr == ""
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_report_leaves_no_figures_of_an_older_one(in_process, tmp_path):
     in_process("fit", REFERENCE, "-o", "s.json")
     in_process("generalize", "s.json", "-o", "1.parquet", "--reproduce")

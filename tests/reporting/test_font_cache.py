@@ -27,7 +27,7 @@ def ours(tmp_path):
     return tmp_path / f"dmpcli-matplotlib-{os.getuid()}"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_home_that_can_be_written_is_left_to_matplotlib(tmp_path):
     assert drawn(tmp_path) == ("", "")
 

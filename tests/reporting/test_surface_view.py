@@ -174,7 +174,7 @@ def strokes(ground):
     return placed([reference, modified(), original()], ground, reference)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_figure_9_is_drawn_the_same_twice(strokes, ground):
     files = figures.gallery(strokes, ground)
     assert {"fig9_surface.svg", "fig9_surface.png"} <= set(files)
