@@ -4,9 +4,9 @@ import numpy as np
 
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
+from tests.nearest import nearest_rms
 
 
 def main() -> None:

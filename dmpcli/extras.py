@@ -143,13 +143,3 @@ def _where(extra: Extra) -> str:
         return "every Python"
     machines = ", ".join(_MACHINES[machine] for machine in extra.wheels.machines)
     return f"CPython 3.11 to {'.'.join(map(str, extra.wheels.newest))} on {machines}"
-
-
-def table() -> str:
-    """Return the table of extras in docs/install.md."""
-    lines = ["| extra | for | installs | wheels |", "| --- | --- | --- | --- |"]
-    for extra in EXTRAS:
-        packages = ", ".join(extra.packages)
-        where = _where(extra) if extra.wheels else "every Python and system"
-        lines.append(f"| `dmpcli[{extra.name}]` | {extra.purpose} | {packages} | {where} |")
-    return "\n".join(lines) + "\n"

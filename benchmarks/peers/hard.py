@@ -12,9 +12,9 @@ from benchmarks.peers.models import D, K
 from dmpcli.arrays import Floats
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.spatial.trajectory import Trajectory
 from tests import cases, human_strokes
+from tests.nearest import nearest_rms
 
 STEP = 1e-3
 """Finest step of mp-pytorch, by the duration: it prepares for as many steps squared."""

@@ -26,8 +26,8 @@ MARGIN = 1.1
 
 # Delay of the mean of a period's two readings of what is taken up evenly, in periods.
 _READ = 0.25
-# Steps within a period; of the bisection, and how far from the rule a bound is looked for, times.
-_WITHIN, _STEPS, _BRACKET = 20, 20, 100.0
+# Steps within a period.
+_WITHIN = 20
 # Gains are softened by this, so many times.
 _SOFTER, _SOFTENINGS = 1.2, 15
 
@@ -121,30 +121,3 @@ def steadied(
             return gains
         gains = gains.softened(_SOFTER)
     return None
-
-
-def smallest_damping(
-    stiffness: float, delay: float, period: float, integral: float = np.inf, tool: float = 0.0
-) -> float:
-    """Smallest stable damping of a law whose mass is period times damping, N·s/mm.
-
-    Parameters
-    ----------
-    stiffness : float
-        N/mm.
-    delay : float
-        s.
-    period : float
-        s.
-    integral : float
-        T_i, s.
-    tool : float
-        Mass on the sensor's tool side, N·s²/mm.
-    """
-    about = stiffness * (delay + period / 2.0)
-    low, high = about / _BRACKET, about * _BRACKET
-    for _ in range(_STEPS):
-        middle = float(np.sqrt(low * high))
-        gains = ForceGains(period * middle, middle, 0.0, integral, period)
-        low, high = (low, middle) if is_stable(gains, stiffness, delay, tool) else (middle, high)
-    return high

@@ -139,27 +139,6 @@ def acceleration(
     return (force - law.damping * velocity - law.stiffness * displacement) / law.mass  # eq. (1)
 
 
-def advance(
-    law: AdmittanceLaw, force: Floats, velocity: Floats, displacement: Floats
-) -> tuple[Floats, Floats]:
-    """Take one step of eq. (1)-(3) on axes that add like numbers.
-
-    Parameters
-    ----------
-    law : AdmittanceLaw
-    force, velocity, displacement : array, shape (..., n)
-        F(k), v(k-1) and x(k-1) - x0.
-
-    Returns
-    -------
-    tuple of array, shape (..., n)
-        v(k) and x(k) - x0.
-    """
-    a = acceleration(law, force, velocity, displacement)  # eq. (1)
-    v = a * law.period + velocity  # eq. (2)
-    return v, v * law.period + displacement  # eq. (3)
-
-
 def move(
     law: AdmittanceLaw,
     pose: DragState,

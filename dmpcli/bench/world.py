@@ -190,12 +190,6 @@ class World:
         found: Floats = 1e3 * (J[:, :6] / self._stiffness) @ J[:, :6].T
         return found
 
-    def series_stiffness(self, normal: Floats) -> float:
-        """Stiffness of pen and arm one after the other along a unit normal, N/mm."""
-        arm = float(normal @ self.compliance @ normal)
-        along = float(normal @ self.pose.rotation[:, 2]) ** 2
-        return 1.0 / (along / self.parameters.pen.stiffness + arm)
-
     def joints_of(self, pose: Pose, near: Floats) -> Floats:
         """Joint angles of a pose of the TCP, shape (6,), rad; nearest to `near`.
 

@@ -1,28 +1,15 @@
 """What people type, command by command: the examples of every ``--help``, which the tests run.
 
 They follow one another in one folder: what a later one reads, an earlier one wrote, or is one of
-the files that a user has (`GIVEN`). A real cell is named by the addresses `SENSOR` and `ROBOT`.
+the files that a user has: meshes, pairs, goals over time, a tool without weight, a recording of
+another program, a drawing, points touched on a mesh, and what a crash has left. A real cell is
+named by the addresses `SENSOR` and `ROBOT`.
 """
 
 from typing import NamedTuple
 
 SENSOR, ROBOT = "netft://192.168.1.10", "elite://192.168.1.20"
 """What stands for the reader's own instruments."""
-
-GIVEN = (
-    "part.stl",
-    "pairs.csv",
-    "goals.csv",
-    "geometry.json",
-    "log.csv",
-    "drawing.svg",
-    "block.stl",
-    "touched.csv",
-    "cut.parquet.journal",
-)
-"""Files that a user has before the first example: meshes, pairs, goals over time, a tool without
-weight, a recording of another program, a drawing, points touched on a mesh, and what a crash has
-left."""
 
 
 class Example(NamedTuple):

@@ -16,9 +16,7 @@ from dmpcli.surfaces.plane import PlaneCharts
 from dmpcli.surfaces.surface import ChartImage, Charts
 
 # Rows of the matrix that every roll-out is a product with: a, b and the six forced responses.
-_START, _GOAL, _FORCED = 0, 1, 2
-# Samples whose tool orientations are worked out at once, so that they stay in the cache.
-_IN_CACHE = 1 << 15
+_START, _GOAL = 0, 1
 
 
 @dataclass(frozen=True)
@@ -175,64 +173,6 @@ def roll_out(
     return Trajectories(position, euler, lift)
 
 
-def poses(
-    skill: Skill,
-    shared: Floats,
-    pairs: Pairs,
-    charts: Charts | None,
-    amplitude: Amplitude = "keep",
-    orientation: Orientation = "keep",
-    out: Floats | None = None,
-) -> Floats:
-    """Draw a skill at new pairs into one array of poses; on a plane without a detour.
-
-    Parameters
-    ----------
-    skill, shared, pairs, charts, amplitude, orientation
-        As in `roll_out`.
-    out : array, shape (B, T, 6), optional
-        Where to write them; a new array without it.
-
-    Returns
-    -------
-    array, shape (B, T, 6)
-        x, y, z, mm, and unwrapped X-Y-Z Euler angles, rad; NaN for a skill without orientation.
-        Which strokes of a mesh could not be drawn, `roll_out` tells.
-    """
-    samples = shared.shape[1]
-    out = np.empty((len(pairs), samples, 6)) if out is None else out
-    if not isinstance(charts, PlaneCharts):
-        drawn = roll_out(skill, shared, pairs, charts, amplitude, orientation)
-        out[..., :3] = drawn.position
-        out[..., 3:] = np.nan if drawn.euler is None else drawn.euler
-        return out
-    scale = _modified_scale(skill, charts.goals, amplitude, 1.0)
-    goal = _reaching(skill, charts.goals, scale[:, :3], shared[:5])
-    turn, angles = None, np.zeros((samples, 3))
-    if skill.oriented:
-        turned = orientation == "surface"
-        frames = charts.axes[:, None] if turned else skill.frame.axes[None, None]
-        turn = _ending(skill, _turn(skill, pairs, frames, turned), scale, shared)
-        if turn.alike:
-            angles, turn = _euler(turn, shared, scale)[0], None
-    # Angles that all strokes share ride along in the product.
-    columns = np.concatenate([shared[:5].T, angles], axis=1)
-    factors = np.zeros((len(pairs), 8, 6))
-    factors[:, :5, :3] = _in_base(charts, goal, scale).swapaxes(1, 2)
-    factors[:, [5, 6, 7], [3, 4, 5]] = 1.0
-    if turn is None:
-        np.matmul(columns, factors, out=out)
-    else:
-        size = max(1, _IN_CACHE // samples)
-        for rows in (slice(first, first + size) for first in range(0, len(pairs), size)):
-            out[rows, :, :3] = columns[:, :5] @ factors[rows, :5, :3]
-            out[rows, :, 3:] = _euler(turn[rows], shared, scale[rows])
-    out[:, 0, :3] = _first(charts, scale, shared)
-    if not skill.oriented:
-        out[..., 3:] = np.nan
-    return out
-
-
 def _coefficients(start: Floats, goal: Floats, scale: Floats) -> Floats:
     """Factors (B, 3, 5) of the first five shared curves: a, b and the three forced coordinates."""
     coefficients = np.zeros((len(start), 3, 5))
@@ -356,10 +296,6 @@ class _Turn:
     def alike(self) -> bool:
         """Whether one row serves all pairs."""
         return len(self.frames) == len(self.begin) == len(self.goal) == 1
-
-    def __getitem__(self, rows: slice) -> "_Turn":
-        parts = (self.frames, self.begin, self.goal)
-        return _Turn(*(part if len(part) == 1 else part[rows] for part in parts))
 
 
 def _turn(skill: Skill, pairs: Pairs, frames: Floats, turned: bool = False) -> _Turn:

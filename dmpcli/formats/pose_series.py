@@ -31,8 +31,8 @@ _FAR = 4
 _EPOCH = 1_000_000 * 1_000_000_000
 """A first stamp beyond this, ns, counts from an epoch."""
 
-POSE, WRENCH = 7, 6
-"""Numbers of a row: x, y, z, m, and a quaternion x, y, z, w; or forces and torques."""
+POSE = 7
+"""Numbers of a row of poses: x, y, z, m, and a quaternion x, y, z, w."""
 
 
 @dataclass

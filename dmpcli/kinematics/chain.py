@@ -140,25 +140,3 @@ def frames(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
         position[..., i + 1, :] = position[..., i, :] + np.matvec(R, step[..., i, :])
         rotation[..., i + 1, :, :] = R @ link[..., i, :, :]
     return position, rotation
-
-
-def jacobian(arm: Arm, q: Floats) -> Floats:
-    """Geometric Jacobian of the flange, base axes: velocity and angular velocity per joint speed.
-
-    Column i is ``[z × (p - p_i), z]`` with z and p_i axis and origin of joint i.
-
-    Parameters
-    ----------
-    arm : Arm
-    q : array, shape (..., 6)
-        rad.
-
-    Returns
-    -------
-    array, shape (..., 6, 6)
-        Rows 0-2 in mm/rad, rows 3-5 in rad/rad.
-    """
-    position, rotation = frames(arm, q)
-    axis = rotation[..., :6, :, 2]
-    lever = position[..., 6:, :] - position[..., :6, :]
-    return np.swapaxes(np.concatenate([np.cross(axis, lever), axis], axis=-1), -1, -2)

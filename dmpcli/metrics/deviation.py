@@ -15,7 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from dmpcli.arrays import Floats, Integers
 
 if TYPE_CHECKING:
-    from dmpcli.metrics.kernels.polyline import Curve
+    from dmpcli.metrics.kernels.polyline import Polyline
 
 # Pairs of point and segment held at once: temporaries of 256 kB stay in the processor's cache.
 _BLOCK = 32_000
@@ -107,7 +107,7 @@ class Taught:
         return Deviations(_rms(nearest), nearest.max(axis=1), _rms(apart), apart.max(axis=1))
 
     @cached_property
-    def _curve(self) -> "tuple[Curve, Floats]":
+    def _curve(self) -> "tuple[Polyline, Floats]":
         """What kernels search, and the clearance of its corners."""
         from dmpcli.metrics.kernels import polyline
 
@@ -221,11 +221,6 @@ class Taught:
             window[0] *= wide[s, None]
             near[s] = np.sqrt(_to_segments(window, point[:, s, None]).min(axis=1))
         return near
-
-
-def nearest_rms(points: Floats, polyline: Floats) -> float:
-    """Root mean square of `nearest_distance`, in the points' unit."""
-    return float(_rms(nearest_distance(points, polyline)[None])[0])
 
 
 def nearest_distance(points: Floats, polyline: Floats) -> Floats:

@@ -12,7 +12,7 @@ from dmpcli.arrays import Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, length
 
 if TYPE_CHECKING:
-    from dmpcli.metrics.kernels.polyline import Curve
+    from dmpcli.metrics.kernels.polyline import Polyline
 
 _REACH = 8
 """Samples of the demonstration looked at on either side of the one of the same phase."""
@@ -42,7 +42,7 @@ class TaughtHeights:
         return self._clearance(_REACH)
 
     @cached_property
-    def _curve(self) -> "tuple[Curve, Floats]":
+    def _curve(self) -> "tuple[Polyline, Floats]":
         """What kernels search, and the clearance of its corners beyond the next ones."""
         from dmpcli.metrics.kernels import polyline
 

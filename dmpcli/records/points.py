@@ -10,7 +10,7 @@ import numpy as np
 from dmpcli.arrays import Floats
 from dmpcli.records import file_io
 from dmpcli.records.pairs import GOAL, GOAL_ANGLES, START, START_ANGLES
-from dmpcli.records.schemas import EULER_ANGLES, POSITION
+from dmpcli.records.schemas import POSE
 from dmpcli.records.touched import PART
 from dmpcli.spatial.rotations import to_euler
 
@@ -31,7 +31,7 @@ class PointFile:
 
     def __init__(self, path: str, part: Floats | None = None) -> None:
         self._path, self._part = path, part
-        columns = (*POSITION, *EULER_ANGLES, *(() if part is None else PART))
+        columns = (*POSE, *(() if part is None else PART))
         self._lines = [",".join(columns)]
         self._told = 0
         self.count = 0

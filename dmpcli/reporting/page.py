@@ -147,7 +147,6 @@ def _figure(figure: ReportFigure) -> str:
 
 _HEAD = re.compile(r"^.*?(?=<svg)", re.DOTALL)
 _META = re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL)
-_SIZE = re.compile(r'(<svg[^>]*?) width="[^"]*"| height="[^"]*pt"')
 _GROUP = re.compile(r'<g id="[^"]*">')
 _NAMED = re.compile(r'id="([^"]+)"')
 

@@ -65,4 +65,4 @@ def _load_on_meshes() -> None:
     inverse.extents(at)
     step, nodes = np.ones((1, 2)), np.zeros((1, 2, 2, 12))
     inverse.mark(np.zeros((1, 1, 1), dtype=bool), at, step, two, 0.0)
-    inverse.settle(nodes, step, two, at, v, v, inverse.StepLimits(1, 1.0, 1.0, 1.0), True)
+    inverse.settle(nodes, step, two, at, v, v, inverse.NewtonLimits(1, 1.0, 1.0, 1.0), True)

@@ -144,16 +144,6 @@ class MeshShape:
         angles = np.radians(self.dihedrals)
         return heights(self.corners, normals, self.topology.neighbours, angles)
 
-    @property
-    def chordal_error(self) -> float:
-        """Estimated largest distance between the mesh and its smooth surface, mm."""
-        return float(self.heights.max())
-
-    @property
-    def edge_length(self) -> float:
-        """Mean length of the edges, mm."""
-        return float(length(np.roll(self.corners, -1, axis=1) - self.corners).mean())
-
     @cached_property
     def reach(self) -> Floats:
         """Largest distance of the smooth course of a stroke from the mesh at each face, (m,), mm.

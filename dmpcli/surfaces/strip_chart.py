@@ -263,7 +263,7 @@ def _feet_compiled(
     feet = _Feet(foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back)
     samples.lift(
         mesh.facets,
-        samples.Strip(nodes.values, nodes.normal, nodes.stretch, nodes.away),
+        samples.StripNodes(nodes.values, nodes.normal, nodes.stretch, nodes.away),
         along,
         aside,
         centre.sign,

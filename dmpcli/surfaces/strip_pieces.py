@@ -135,7 +135,7 @@ class Strip:
         from dmpcli.surfaces.kernels import inverse
 
         at, step = self.at.copy(), self.step[:, 0].copy()
-        limits = inverse.StepLimits(_STEPS, _STILL, _LONGEST, _LEAST_AREA)
+        limits = inverse.NewtonLimits(_STEPS, _STILL, _LONGEST, _LEAST_AREA)
         zero = self.zero.astype(float)
         still = inverse.settle(self.nodes.values, step, zero, at, foot, facet, limits, seeded)
         return at, still

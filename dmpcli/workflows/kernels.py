@@ -113,13 +113,13 @@ def to_measure(asked: Kernels, strokes: int, on_mesh: bool) -> Means:
     return "compiled" if asked == "auto" and many and there() else "pure"
 
 
-def kept(ready: "Ready | None" = None) -> bool:
+def kept(ready: "CompiledKernels | None" = None) -> bool:
     """Tell whether what an earlier run compiled is there, as far as names tell."""
     ready = _to_draw() if ready is None else ready
     return all(folder and any(Path(folder).glob(f"*{name}*.nbi")) for folder, name in ready.files())
 
 
-def get_ready(ready: "Ready | None" = None) -> None:
+def get_ready(ready: "CompiledKernels | None" = None) -> None:
     """Load the kernels of a job, or compile them; say so where it takes time.
 
     Those that draw, unless a module names others.
@@ -138,7 +138,7 @@ def get_ready(ready: "Ready | None" = None) -> None:
         ready.load()
 
 
-class Ready(Protocol):
+class CompiledKernels(Protocol):
     """A module that knows the kernels of a job."""
 
     def files(self) -> list[tuple[str, str]]:
@@ -148,7 +148,7 @@ class Ready(Protocol):
         """Call each once."""
 
 
-def _to_draw() -> Ready:
+def _to_draw() -> CompiledKernels:
     from dmpcli.surfaces.kernels import ready
 
     return ready

@@ -25,10 +25,10 @@ from dmpcli.admittance.force_stability import (
     growth,
     is_safe,
     is_stable,
-    smallest_damping,
     steadied,
 )
 from dmpcli.admittance.oscillation import AlternationDetector
+from tests.admittance.damping import smallest_damping
 from tests.control.contact_plant import Plant
 
 PERIOD = 0.02

@@ -13,9 +13,9 @@ from dmpcli.admittance.force_stability import (
     is_safe,
     is_stable,
     loop_matrix,
-    smallest_damping,
     steadied,
 )
+from tests.admittance.damping import smallest_damping
 
 PERIOD, FINE = 0.02, 100
 """s of a cycle, and steps in it."""

@@ -17,6 +17,7 @@ from dmpcli.admittance.oscillation import AlternationDetector
 from dmpcli.errors import DmpError
 from dmpcli.spatial import rotations
 from dmpcli.spatial.wrench import Tool
+from tests.admittance.damping import smallest_damping
 from tests.kept import Kept
 
 KEPT = Kept(__file__)
@@ -48,7 +49,6 @@ def a_hand_that_leads():
             state = model.brake(LAW, state, bounds or model.Bounds(40.0, 300.0, 0.3, 2.0))
         found.append(state)
     found.append(model.acceleration(LAW, np.arange(6.0), np.ones(6), 2 * np.ones(6)))
-    found.append(model.advance(LAW, np.arange(6.0), np.ones(6), 2 * np.ones(6)))
     return found
 
 
@@ -74,8 +74,8 @@ def forces_under_control():
             force_stability.loop_matrix(gains, stiffness, delay, 0.6e-3),
             force_stability.steadied(gains.softened(0.3), stiffness, delay, 0.6e-3),
         ]
-        found.append(force_stability.smallest_damping(stiffness, delay, 0.02))
-        found.append(force_stability.smallest_damping(stiffness, delay, 0.02, 4.0))
+        found.append(smallest_damping(stiffness, delay, 0.02))
+        found.append(smallest_damping(stiffness, delay, 0.02, 4.0))
     return found
 
 
@@ -176,7 +176,7 @@ def loops_of_any_delay():
             found += [gains, force_stability.loop_matrix(gains, 3.0, delay)]
             found += [force_stability.growth(gains, 3.0, delay)]
             found += [force_stability.steadied(gains, 30.0, delay, 2e-4)]
-        found.append(force_stability.smallest_damping(3.0, delay, 0.02, 0.4))
+        found.append(smallest_damping(3.0, delay, 0.02, 0.4))
     state, gains = force_law.LawState(0.1, 2.0, 0.05), force_law.by_rule(2.0, 0.06, 0.02)
     for error, fastest in ((9.0, 1.0), (-9.0, 1.0), (0.3, 50.0), (2.0, 0.5)):
         state = force_law.advance(gains, state, error, fastest)

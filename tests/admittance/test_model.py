@@ -7,7 +7,6 @@ from dmpcli.admittance.model import (
     AdmittanceLaw,
     Bounds,
     DragState,
-    advance,
     brake,
     check_stable,
     move,
@@ -30,6 +29,15 @@ def one(M, D, K, T):
 
 def at_rest(rotation=PEN_DOWN, position=(0.0, 0.0, 0.0)):
     return DragState(np.array(position), rotation, np.zeros(6))
+
+
+def advance(law, force, velocity, displacement):
+    """v and x after one step of a tool that moves along base x alone."""
+    of_six = (np.repeat(part, 6) for part in (law.mass, law.damping, law.stiffness))
+    before = DragState(np.eye(3)[0] * displacement, np.eye(3), np.eye(6)[0] * velocity)
+    home = at_rest(np.eye(3))
+    after = move(AdmittanceLaw(*of_six, law.period), before, np.eye(6)[0] * force, home)
+    return after.velocity[:1], after.position[:1]
 
 
 def transition(law):

@@ -13,6 +13,7 @@ from dmpcli.spatial.pose import Pose
 from dmpcli.spatial.rotations import exp_one
 from tests.bench.worlds import PERIOD, TIP, at, press, world
 from tests.extras_here import needs
+from tests.kinematics.jacobian import jacobian
 
 pytestmark = needs(BENCH)
 
@@ -112,7 +113,7 @@ def test_set_points_may_come_while_others_are_on_their_way():
 def test_a_load_bends_it_as_its_joints_stiffness_says():
     bench = world()
     press(bench, 3.0)
-    J = chain.jacobian(bench.arm, bench.joints)
+    J = jacobian(bench.arm, bench.joints)
     flange, _ = chain.forward_one(bench.arm, bench.joints)
     lever = bench.pose.position - flange
     # The TCP's rows, mm/rad; N·m/rad are 1000 N·mm/rad.

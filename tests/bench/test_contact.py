@@ -34,7 +34,9 @@ def test_the_true_force_is_the_pens_spring_and_the_arms_one_after_the_other(k):
         # MuJoCo's contact is a spring too: of some 2000 N/mm.
         assert abs(bench.tip[2] - TIP[2]) < 0.05
     normal = bench.parameters.workpiece.pose.rotation[:, 2]
-    assert forces[1] - forces[0] == pytest.approx(bench.series_stiffness(normal), rel=0.02)
+    along = float(normal @ bench.pose.rotation[:, 2]) ** 2
+    both = 1.0 / (along / k + float(normal @ bench.compliance @ normal))
+    assert forces[1] - forces[0] == pytest.approx(both, rel=0.02)
 
 
 @pytest.mark.slow

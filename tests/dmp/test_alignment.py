@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from dmpcli.dmp import smoothing
 from dmpcli.dmp.alignment import ComparedPath, align
 from dmpcli.errors import InputError
-from dmpcli.metrics.deviation import nearest_rms
 from tests.human_strokes import strokes
+from tests.nearest import nearest_rms
 
 FINE = np.linspace(0.0, 1.0, 20001)
 

@@ -11,10 +11,10 @@ from dmpcli.dmp.generalization import draw
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.rollout import Pairs
-from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.plane import extent
 from tests.human_strokes import shapes, strokes
+from tests.nearest import nearest_rms
 
 UP = np.array([0.0, 0.0, 1.0])
 

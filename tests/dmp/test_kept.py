@@ -646,6 +646,11 @@ def rings_drawn():
     return found
 
 
+def in_one(drawn):
+    """Positions and angles of roll-outs, (B, T, 6)."""
+    return np.concatenate([drawn.position, drawn.euler], axis=-1)
+
+
 @KEPT.case
 def poses_and_curves():
     skill = paper(True)
@@ -659,10 +664,10 @@ def poses_and_curves():
         charts = charts_of(skill, pairs, surface)
         shared = rollout.curves(skill, np.linspace(0.0, skill.duration, 60))
         for more in ({}, {"amplitude": "scale"}, {"orientation": "surface"}):
-            found += [rollout.poses(skill, shared, pairs, charts, **more)]
+            found += [in_one(rollout.roll_out(skill, shared, pairs, charts, **more))]
     original = paper(True, model="original")
     shared = rollout.curves(original, np.linspace(0.0, original.duration, 60))
-    found += [shared, rollout.poses(original, shared, TURNED, None)]
+    found += [shared, in_one(rollout.roll_out(original, shared, TURNED, None))]
     return found
 
 

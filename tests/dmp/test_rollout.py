@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.dmp.feasibility import admit, snapped
-from dmpcli.dmp.generalization import charts_of, draw
+from dmpcli.dmp.generalization import draw
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.dmp.rollout import Pairs, curves, poses
+from dmpcli.dmp.rollout import Pairs, curves
 from dmpcli.dmp.time_scaling import timing
 from dmpcli.metrics.paper_values import GENERALIZATION
 from dmpcli.spatial import rotations
@@ -168,38 +168,6 @@ def test_pairs_drawn_together_equal_pairs_drawn_alone(skill):
         np.testing.assert_allclose(stroke.position, alone.position, atol=1e-9)
         np.testing.assert_array_equal(stroke.timing.t, alone.timing.t)
         np.testing.assert_allclose(stroke.euler, alone.euler, atol=1e-12)
-
-
-@pytest.mark.sweep(kept=5)
-@pytest.mark.slow
-@pytest.mark.parametrize("orientation", ["keep", "surface"])
-@pytest.mark.parametrize("asked", [False, True])
-@pytest.mark.parametrize("ground", ["parallel", "plane", "original", "no tool"])
-def test_poses_in_one_array_are_those_of_the_strokes(skill, orientation, asked, ground):
-    if ground == "original":
-        stroke = paper_stroke(turning=True)
-        skill = fit([stroke], FitOptions("original", "distance")).skill
-        orientation = "keep"
-    if ground == "no tool":
-        skill, asked = fit([replace(paper_stroke(), rotation=None)], FitOptions()).skill, False
-    rng = np.random.default_rng(3)
-    start = START + rng.uniform(-300, 300, (70, 3)) * [1, 1, 0]
-    goal = start + rng.uniform(20, 200, (70, 3)) * [1, -1, 0]
-    R = Rotation.from_euler("XYZ", rng.normal([3.0, 0, 0], 0.2, (70, 3))).as_matrix()
-    pairs = Pairs(start, goal, R, R) if asked else Pairs(start, goal)
-    plane = Plane(START, np.array([0.0, 0.0, 1.0])) if ground == "plane" else None
-    charts = None if ground == "original" else charts_of(skill, pairs, plane)
-    t = np.linspace(0.0, skill.duration, 501)
-    out = np.full((70, 501, 6), 7.0)
-    found = poses(skill, curves(skill, t), pairs, charts, "scale", orientation, out)
-    assert found is out
-    style = GeneralizeOptions(amplitude="scale", orientation=orientation)
-    drawn = draw(skill, pairs, np.full(70, skill.duration), plane, style)
-    np.testing.assert_allclose(found[..., :3], [s.position for s in drawn], rtol=0, atol=1e-9)
-    if ground == "no tool":
-        assert np.isnan(found[..., 3:]).all()
-    else:
-        np.testing.assert_allclose(found[..., 3:], [s.euler for s in drawn], rtol=0, atol=1e-12)
 
 
 def test_a_new_duration_scales_tau_and_leaves_the_path(skill):

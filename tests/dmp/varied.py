@@ -883,7 +883,6 @@ def few_functions_to_turned_pairs():
         for pairs in asked:
             charts = None if skill.model == "original" else charts_of(skill, pairs, PLATE)
             for more in ({}, {"amplitude": "scale"}, {"orientation": "surface"}):
-                found.append(rollout.poses(skill, shared, pairs, charts, **more))
                 drawn = rollout.roll_out(skill, shared, pairs, charts, **more)
                 found += [drawn.position, drawn.euler]
             seconds = np.full(len(pairs), skill.duration)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError, RefusedError
 from dmpcli.kinematics import chain, inverse, models
+from tests.kinematics.jacobian import jacobian
 
 EC66 = models.model("ec66")
 ANGLES = st.lists(st.floats(-np.pi, np.pi), min_size=6, max_size=6).map(np.array)
@@ -168,7 +169,7 @@ def test_the_three_measures_multiply_to_the_determinant_of_the_jacobian(q):
     a2, a3 = EC66.a[1:3]
     scale = a2 * a3 * (a2 + a3)
     product = inverse.singularity(EC66, q).prod() * scale
-    determinant = abs(np.linalg.det(chain.jacobian(EC66, q)))
+    determinant = abs(np.linalg.det(jacobian(EC66, q)))
     assert product == pytest.approx(determinant, abs=1e-9 * scale)
 
 

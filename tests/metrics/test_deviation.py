@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmpcli.metrics import deviation
-from dmpcli.metrics.deviation import Taught, nearest_distance, nearest_rms
+from dmpcli.metrics.deviation import Taught, nearest_distance
 
 
 def brute(points, polyline):
@@ -45,9 +45,10 @@ def test_long_files_are_done_in_blocks_with_the_same_result():
     assert whole[::97] == pytest.approx(brute(points[::97], polyline), abs=1e-9)
 
 
-def test_nearest_rms_of_a_parallel_line_is_the_gap():
+def test_every_point_of_a_parallel_line_is_off_by_the_gap():
     line = np.column_stack([np.linspace(0, 10, 50), np.zeros(50)])
-    assert nearest_rms(line + np.array([0.0, 0.25]), line) == pytest.approx(0.25, abs=1e-12)
+    off = nearest_distance(line + np.array([0.0, 0.25]), line)
+    assert off == pytest.approx(np.full(50, 0.25), abs=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 7])

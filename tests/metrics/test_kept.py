@@ -20,6 +20,7 @@ from dmpcli.surfaces.sphere import Sphere
 from tests import cases, human_strokes
 from tests.kept import Kept
 from tests.metrics import varied
+from tests.nearest import nearest_rms
 
 KEPT = Kept(__file__)
 U = cases.jerk(np.linspace(0.0, 1.0, 241))
@@ -85,7 +86,7 @@ def deviations():
     x = strokes()
     for other in (x[4], x[1], x[6]):
         found.append([deviation.nearest_distance(one, other) for one in x])
-        found.append([deviation.nearest_rms(one, other) for one in x])
+        found.append([nearest_rms(one, other) for one in x])
     taught = deviation.Taught(T, x[0])
     place = np.stack([x[k] * [1.1, 1, 1] for k in (0, 4, 1)]).transpose(2, 0, 1)
     found.append(taught.deviations(np.linspace(0, 6, 241), place, np.array([1.1, 1.0, 0.9])))

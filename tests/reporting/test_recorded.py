@@ -8,7 +8,6 @@ from dmpcli.dmp.options import FitOptions
 from dmpcli.dmp.paper_preprocessing import prepare
 from dmpcli.dmp.skill import TaughtSurface
 from dmpcli.errors import InputError
-from dmpcli.metrics.deviation import nearest_rms
 from dmpcli.records.learning_record import PAPER, Lesson
 from dmpcli.reporting.recorded import Recorded
 from dmpcli.reporting.stroke_measures import row_of
@@ -16,6 +15,7 @@ from dmpcli.reporting.strokes import strokes_of
 from dmpcli.spatial.trajectory import Trajectory
 from dmpcli.surfaces.sphere import Sphere
 from tests.minimum_jerk import minimum_jerk
+from tests.nearest import nearest_rms
 from tests.reporting.example_files import GOAL, START, trajectory, wave
 
 RADIUS = 200.0

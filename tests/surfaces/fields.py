@@ -145,3 +145,8 @@ def strokes(lengths, T, periods=2, height=49.98):
     out = np.zeros((len(lengths), T, 3))
     out[..., 0], out[..., 1] = np.asarray(lengths)[:, None] * s, wave
     return out
+
+
+def edge_length(mesh):
+    """Mean length of a mesh's edges, mm."""
+    return np.linalg.norm(np.roll(mesh.corners, -1, axis=1) - mesh.corners, axis=-1).mean()

@@ -124,8 +124,8 @@ def what_meshes_say_of_themselves():
             mesh.shape.dihedrals,
             mesh.shape.developable,
             mesh.outward,
-            mesh.shape.edge_length,
-            mesh.shape.chordal_error,
+            fields.edge_length(mesh),
+            mesh.shape.heights.max(),
             mesh.shape.reach,
             mesh.planes_at(np.arange(len(mesh.F))),
         ]

@@ -23,7 +23,7 @@ def part(name):
 
 def half_noisy(mesh, by_edge):
     """Noise of so much of an edge on the vertices of x > 0."""
-    shift = by_edge * mesh.shape.edge_length * np.random.default_rng(1).normal(size=mesh.V.shape)
+    shift = by_edge * fields.edge_length(mesh) * np.random.default_rng(1).normal(size=mesh.V.shape)
     return Mesh(mesh.V + np.where(mesh.V[:, :1] > 0.0, shift, 0.0), mesh.F)
 
 
@@ -55,7 +55,7 @@ def test_noise_on_half_of_a_mesh_is_found_in_that_half(name, by_edge):
     assert share(mesh, noisy) >= 0.6
     assert share(mesh, ~noisy) <= 0.05
     sigma = np.median(mesh.shape.noise[mesh.shape.noise > 0.0])
-    assert sigma == pytest.approx(by_edge * smooth.shape.edge_length, rel=0.35)
+    assert sigma == pytest.approx(by_edge * fields.edge_length(smooth), rel=0.35)
 
 
 def test_normals_far_from_noise_are_those_without_it():

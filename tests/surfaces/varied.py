@@ -905,10 +905,10 @@ def what_small_meshes_say_of_themselves():
             mesh.shape.dihedrals,
             mesh.shape.developable,
             mesh.outward,
-            mesh.shape.edge_length,
+            fields.edge_length(mesh),
         ]
         found += [
-            mesh.shape.chordal_error,
+            mesh.shape.heights.max(),
             mesh.shape.reach,
             mesh.planes_at(np.arange(len(mesh.F))),
             parts_of(mesh),

@@ -23,7 +23,7 @@ _ROOM = 1e-9
 """What rounding may add up to, and more: share, and mm."""
 
 
-class Curve(NamedTuple):
+class Polyline(NamedTuple):
     """A polyline of m corners, and a tree of boxes about its segments.
 
     Attributes
@@ -41,7 +41,7 @@ class Curve(NamedTuple):
     first: Integers
 
 
-def curve(corners: Floats) -> Curve:
+def curve(corners: Floats) -> Polyline:
     """Make a curve of corners (m, 3), m ≥ 2, ready to be searched."""
     segments, leaves = len(corners) - 1, 1
     while segments > _LEAF * leaves:
@@ -54,7 +54,7 @@ def curve(corners: Floats) -> Curve:
     for node in range(leaves - 2, -1, -1):
         below = boxes[2 * node + 1 : 2 * node + 3]
         boxes[node] = np.concatenate([below[:, :3].min(axis=0), below[:, 3:].max(axis=0)])
-    return Curve(np.ascontiguousarray(corners, dtype=float), boxes, first.astype(np.int64))
+    return Polyline(np.ascontiguousarray(corners, dtype=float), boxes, first.astype(np.int64))
 
 
 @kernel
@@ -94,7 +94,7 @@ def _off_solid(boxes: Floats, node: int, wide: float, u: float, v: float, w: flo
 
 @kernel
 def _nearest_segment(
-    curve: Curve, wide: float, u: float, v: float, w: float, bound: float, stack: Integers
+    curve: Polyline, wide: float, u: float, v: float, w: float, bound: float, stack: Integers
 ) -> float:
     """Squared distance of a point from the whole curve, which is no more than a bound."""
     best, inner = bound, len(curve.first) - 2
@@ -122,7 +122,7 @@ def _nearest_segment(
 
 @kernel
 def deviations(
-    curve: Curve,
+    curve: Polyline,
     clear: Floats,
     same: Floats,
     place: Floats,
@@ -133,7 +133,7 @@ def deviations(
 
     Parameters
     ----------
-    curve : Curve
+    curve : Polyline
     clear : array, shape (m,)
         Least distance of each corner to the segments that do not end there, mm.
     same : array, shape (3, n)
@@ -187,7 +187,7 @@ def deviations(
 
 @kernel
 def _nearest_corner(
-    curve: Curve, wide: float, u: float, v: float, bound: float, at: int, stack: Integers
+    curve: Polyline, wide: float, u: float, v: float, bound: float, at: int, stack: Integers
 ) -> int:
     """The corner nearest to a point, seen along w; the first of several."""
     best, inner = bound, len(curve.first) - 2
@@ -214,7 +214,7 @@ def _nearest_corner(
 
 
 @kernel
-def heights_there(curve: Curve, clear: Floats, uv: Floats, stretch: Floats, out: Floats) -> None:
+def heights_there(curve: Polyline, clear: Floats, uv: Floats, stretch: Floats, out: Floats) -> None:
     """Fill in heights w (B, n) where a curve whose u is stretched passes nearest to u, v (2, B, n).
 
     `clear`, shape (m,), is the least distance of each corner to those that are not next to it, seen

@@ -44,7 +44,7 @@ class FootLimits(NamedTuple):
     near: float
 
 
-class StepLimits(NamedTuple):
+class NewtonLimits(NamedTuple):
     """What `strip_inverse` calls by these names."""
 
     steps: int
@@ -271,7 +271,7 @@ def settle(
     guess: Floats,
     foot: Floats,
     facet: Floats,
-    limits: StepLimits,
+    limits: NewtonLimits,
     seeded: bool,
 ) -> Booleans:
     """Move coordinates `guess` (B, T, 2) over feet (B, T, 3), in place; which strokes are at rest.
@@ -288,7 +288,7 @@ def settle(
         mm.
     facet : array, shape (B, T, 3)
         Normals that the spline is to stand over the feet along.
-    limits : StepLimits
+    limits : NewtonLimits
     seeded : bool
         Whether samples begin where their neighbours lead them.
     """

@@ -62,7 +62,7 @@ def load() -> None:
     nodes = stepping.NodeArrays(line, line, line, one, none[:0, :1], none[:0, :1])
     stepping.lines(facets, limits, walks, number, number, 0, 1, nodes, mark)
     cell = np.empty((0, 2, 2))
-    strip = samples.Strip(np.empty((0, 2, 2, 12)), np.empty((0, 2, 2, 3)), cell, cell)
+    strip = samples.StripNodes(np.empty((0, 2, 2, 12)), np.empty((0, 2, 2, 3)), cell, cell)
     flat, flags = np.empty((0, 1)), none[:0, :1]
     feet = samples.SampleFeet(
         line, line, line, flat.astype(np.int64), flat, flags, flags, flags, flags, line, line

@@ -182,7 +182,7 @@ def followed(
     return closest(facets, p, nodes, offs)
 
 
-class Strip(NamedTuple):
+class StripNodes(NamedTuple):
     """Nodes of B strips, as `strip_grid.Nodes` says it."""
 
     values: Floats
@@ -257,7 +257,7 @@ def _coordinate(
 @kernel
 def lift(
     facets: Facets,
-    strip: Strip,
+    strip: StripNodes,
     u: Floats,
     v: Floats,
     sign: Floats,
