@@ -4,8 +4,9 @@
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make reproduce-force  force on surfaces that are not where the plan has them, in physics
-#   make test        tests, lint, types and import rules
+#   make test        tests, lint, types and import rules, in six minutes on two cores
 #   make test-quick  the quick half of the tests
+#   make test-thorough  those that take a minute each or go through all cases of a kind
 #   make lint        ruff, mypy and import-linter
 #   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
@@ -47,7 +48,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick coverage test-lowest lint lock dist bench peers \
+.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick test-thorough coverage test-lowest lint lock dist bench peers \
     judges pages properties faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
@@ -61,24 +62,32 @@ $(VENV)/installed: FORCE
 
 setup: $(VENV)/installed
 
-# Tests. The quick half leaves out what is marked slow. A file's tests stay in one process, so that
-# what they share is made once. Lint and types are looked at meanwhile: some tests wait in real time,
-# and mypy is one process. For the same reason there are two processes to a core, and of the quick
-# half, which waits little, three to two: each works for 8 s before its first test. WORKERS=N chooses.
+# Tests. The quick half leaves out what is marked slow; make test leaves out what is marked thorough:
+# kernels, which compile for a minute, clusters and laboratories in real time, and of sweeps all
+# cases but a few. A file's tests stay in one process, so that what they share is made once. Lint and
+# types are looked at meanwhile: some tests wait in real time, and mypy is one process. For the same
+# reason there are three processes to two cores, and of the thorough, which wait most, four; WORKERS=N
+# chooses. In a clone that is new one process makes the asserts of all tests ready, not each.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
-PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest --dist loadfile --no-loadscope-reorder
-WHOLE := --numprocesses $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
-QUICK := --numprocesses $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2)) -m "not slow"
+PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest
+MANY  := --dist loadfile --no-loadscope-reorder --numprocesses
+MORE  := $(MANY) $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2))
+TWICE := $(MANY) $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
+QUICK := $(MORE) -m "not slow and not thorough"
 
 test: $(VENV)/installed
 	@mkdir -p $(OUT)
 	@nice -n 5 $(MAKE) --no-print-directory lint > $(OUT)/lint.log 2>&1 & lint=$$!; \
-	    $(PYTEST) $(WHOLE); tests=$$?; wait $$lint; linted=$$?; \
+	    [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }; \
+	    $(PYTEST) $(MORE) -m "not thorough"; tests=$$?; wait $$lint; linted=$$?; \
 	    cat $(OUT)/lint.log; exit $$((tests | linted))
 
 test-quick: $(VENV)/installed
 	$(PYTEST) $(QUICK)
+
+test-thorough: $(VENV)/installed
+	$(PYTEST) $(TWICE) -m thorough
 
 coverage: export COVERAGE_FILE := $(CACHE)/coverage
 coverage: $(VENV)/installed
@@ -190,7 +199,7 @@ pages: $(VENV)/installed
 EXAMPLES ?= 1000
 
 properties: $(VENV)/installed
-	DMPCLI_EXAMPLES=$(EXAMPLES) $(PYTEST) $(WHOLE) -m hypothesis
+	DMPCLI_EXAMPLES=$(EXAMPLES) $(PYTEST) $(TWICE) -m hypothesis
 
 # One seed replays one failure: python -m tests.faults --seed N.
 SEEDS ?= 10000

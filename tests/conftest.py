@@ -5,6 +5,7 @@ import gc
 import os
 import signal
 import sys
+from collections import defaultdict
 
 import pytest
 import typer.testing
@@ -40,8 +41,24 @@ def pytest_collection():
         gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("sweep") is not None:
+            cases[item.nodeid.partition("[")[0]].append(item)
+    for swept in cases.values():
+        _thin(swept)
+
+
+def _thin(swept):
+    """Mark the cases of a sweep as thorough, but for a few that are spread evenly over it."""
+    kept = swept[0].get_closest_marker("sweep").kwargs["kept"]
+    few = {(2 * k + 1) * len(swept) // (2 * kept) for k in range(kept)}
+    for place, item in enumerate(swept):
+        if place not in few:
+            item.add_marker("thorough")
 
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)

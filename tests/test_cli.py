@@ -174,6 +174,7 @@ def told(request, tmp_path_factory):
     return command, subprocess.run(command, cwd=folder, capture_output=True, check=False)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("how", ["closed", "broken"])
 def test_whoever_closes_standard_error_changes_no_output_and_no_exit_code(how, told, tmp_path):

@@ -46,9 +46,9 @@ class Cut:
         return int(self.part.max(initial=-1)) + 1
 
 
-def in_order(rows: int, size: int) -> Cut:
-    """Cut so many rows into parts of so many."""
-    return Cut(np.arange(rows) // size)
+def in_order(rows: Integers, size: int, first: int = 0) -> Cut:
+    """Cut rows of a table, by their numbers, into parts of so many, counted from the first one."""
+    return Cut(rows // size - first)
 
 
 def by_site(site: Integers, offset: Floats, size: int, most: int) -> Cut:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 
@@ -40,8 +41,13 @@ class Shard:
     index: int = 1
     count: int = 1
 
-    def has(self, number: int) -> bool:
-        """Tell whether a part is of this share."""
+    @overload
+    def has(self, number: int) -> bool: ...
+    @overload
+    def has(self, number: Integers) -> Booleans: ...
+
+    def has(self, number: int | Integers) -> bool | Booleans:
+        """Tell whether a part is of this share, or which of many are."""
         return number % self.count == self.index - 1
 
     @property
@@ -110,7 +116,7 @@ class Batch:
     most_sites : int
         Sites in a part.
     first_part : int
-        Number of its first part.
+        Number of its first part; those that its rows leave out have none.
     """
 
     job: Job
@@ -126,12 +132,17 @@ class Batch:
     def __post_init__(self) -> None:
         self._admitted = self.table.good
         self._outcomes: dict[int, Outcome] = {}
+        self._numbers = self.table.numbers
+
+    def _here(self, number: int) -> int:
+        """Which row of this piece has a number in the whole table."""
+        return int(np.searchsorted(self._numbers, number))
 
     @cached_property
     def cut(self) -> Cut:
         """Which rows each part has."""
         if self.sites is None:
-            return in_order(len(self.table), self.size)
+            return in_order(self.table.numbers, self.size, self.first_part)
         lift = np.array([site.offset for site in self.sites.sites] + [0.0])
         return by_site(self.sites.of, lift[self.sites.of], self.size, self.most_sites)
 
@@ -139,8 +150,7 @@ class Batch:
         rows = self.cut.rows(number - self.first_part)
         rows = rows[self._admitted[rows]]
         ids = [self.table.ids[row] for row in rows.tolist()]
-        there = rows + self.table.before
-        part = Part(number, there, ids, self.pairs[rows], self.duration[rows])
+        part = Part(number, self._numbers[rows], ids, self.pairs[rows], self.duration[rows])
         if self.sites is None:
             return part
         used, site = np.unique(self.sites.of[rows], return_inverse=True)
@@ -198,14 +208,12 @@ class Batch:
     def _note(self, outcome: Outcome, size: int, summary: BatchSummary) -> None:
         self._outcomes[outcome.number] = outcome
         for there, why in outcome.failed.items():
-            row = there - self.table.before
+            row = self._here(there)
             self.table.status[row] = f"{self.table.place(row)}, pair {self.table.ids[row]}: {why}"
         for remark in outcome.told:
             summary.told.add(remark)
         if outcome.fatal:
-            said = (
-                f"{self.table.name}: {self.table.status[min(outcome.failed) - self.table.before]}"
-            )
+            said = f"{self.table.name}: {self.table.status[self._here(min(outcome.failed))]}"
             if not outcome.refused:
                 raise InputError(f"{said}; or give --on-error skip")
             raise RefusedError(f"{said}; move the pair, or give --on-error skip")
@@ -226,7 +234,7 @@ class Batch:
         ids, pairs, lasting = self.table.ids, self._ends(good), self._lasting(good)
         normals, status = self._normals(good), self.table.status
         pieces = {
-            there - self.table.before: ends
+            self._here(there): ends
             for outcome in self._outcomes.values()
             for there, ends in outcome.pieces.items()
         }
@@ -264,8 +272,8 @@ class Batch:
         for outcome in self._outcomes.values():
             rows += list(outcome.placed)
             places += [(place + [np.nan] * 3)[:9] for place in outcome.placed.values()]
-        there = np.array(rows, dtype=np.int64)
-        return there - self.table.before, np.array(places).reshape(-1, 9)
+        there = np.searchsorted(self._numbers, np.array(rows, dtype=np.int64))
+        return there, np.array(places).reshape(-1, 9)
 
     def _ends(self, good: Booleans) -> Pairs:
         """Pairs with the ends that their strokes have themselves."""
@@ -297,7 +305,7 @@ class Batch:
             lasting[good & (self.duration == seconds)] = when.t[-1]
         for outcome in self._outcomes.values():
             for there, seconds in outcome.clipped.items():
-                lasting[there - self.table.before] = seconds
+                lasting[self._here(there)] = seconds
         return lasting
 
     def _normals(self, good: Booleans) -> Floats:

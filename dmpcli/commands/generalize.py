@@ -92,7 +92,7 @@ def command(
     from dmpcli.records.record import encode
     from dmpcli.records.storage import located
     from dmpcli.workflows import batches, process, single, surface_input
-    from dmpcli.workflows.generalize import Order, prepared
+    from dmpcli.workflows.generalize import Order, each_alone, prepared
     from dmpcli.workflows.generalize_inputs import one_pair
 
     batch_options.check(wanted, given, pairs is not None)
@@ -170,7 +170,7 @@ def command(
         return prepared_sites(mine, folder, otherwise, wanted.surface_cache)
 
     if stream is not None:
-        batches.write_pieces(stream, ready_of, target, wanted)
+        batches.write_pieces(stream, ready_of, target, wanted, not sites and each_alone(order))
         return
     batches.tell_of_unknown(table)
     batches.write(ready_of(table), target, wanted)

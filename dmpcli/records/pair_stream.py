@@ -2,16 +2,21 @@
 
 A piece is read as a whole table would be, with the lines and rows of the file. Texts with quoted
 cells, which may hold line ends, and lines that end otherwise are read whole.
+
+Of a table of which only some rows are asked for, row groups without any of them are not read, and
+lines of others are passed over: they are counted, not parted.
 """
 
 import hashlib
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
+from dmpcli.arrays import Booleans, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, pairs, parquet, schemas, tables, untrusted
 from dmpcli.records.file_io import Source
@@ -31,6 +36,39 @@ _BLOCK = 1 << 22
 
 _BITS_A_ROW = 64
 
+_BLANK = np.isin(np.arange(256), list(b" \t\r\n#"))
+"""Bytes with which a line that is no row may begin."""
+
+_PASSED_OVER = re.compile(rb"[ \t]*(?:#[^\n]*|\r?\n|\r?\Z)")
+
+
+@dataclass(frozen=True)
+class Share:
+    """Some of the rows of a table, which is cut into parts of so many.
+
+    Attributes
+    ----------
+    size : int
+        Rows of a part.
+    has : callable
+        Tells which parts (N,), by their numbers, are of the share.
+    """
+
+    size: int
+    has: Callable[[Integers], Booleans]
+
+    def rows(self, begin: int, end: int) -> Integers:
+        """Return which rows of a stretch are of the share, rising."""
+        parts = np.arange(begin // self.size, -(-end // self.size))
+        rows = np.add.outer(parts[self.has(parts)] * self.size, np.arange(self.size)).ravel()
+        return rows[(rows >= begin) & (rows < end)]
+
+    def count(self, rows: int) -> int:
+        """Return how many of so many rows are of the share."""
+        parts = np.arange(-(-rows // self.size))
+        size = np.minimum(self.size, rows - parts * self.size)
+        return int(size[self.has(parts)].sum())
+
 
 @dataclass(frozen=True)
 class PairStream:
@@ -43,12 +81,20 @@ class PairStream:
     rows : int
         How many it has; of a text, at most.
     parquet : bool
+    share : Share, optional
+        Only these rows are read.
     """
 
     path: Location
     sha256: str
     rows: int
     parquet: bool
+    share: Share | None = None
+
+    @property
+    def asked(self) -> int:
+        """How many rows are read; of a text, at most."""
+        return self.rows if self.share is None else self.share.count(self.rows)
 
     def pieces(self, rows: int) -> Iterator[PairTable]:
         """Yield the pairs, so many at once.
@@ -70,7 +116,7 @@ class PairStream:
         InputError
             As `pairs.read`.
         """
-        found = next(self.pieces(1), None)
+        found = next(replace(self, share=None).pieces(1), None)
         if found is None:
             raise InputError(f"{self.path}: holds no rows; it needs a header and at least one row")
         return found
@@ -122,42 +168,74 @@ class PairStream:
             names = file.schema_arrow.names
             wanted = [one for one in names if one in pairs.KNOWN]
             unknown = [one for one in names if one not in known]
-            before, waiting, held = 0, [], 0
-            for batch in file.iter_batches(rows, columns=wanted):
+            waiting, numbers = [], np.empty(0, dtype=np.int64)
+            for batch, there in self._batches(file, rows, wanted):
                 waiting.append(batch)
-                held += len(batch)
-                while held >= rows:
+                numbers = np.concatenate([numbers, there])
+                while len(numbers) >= rows:
                     table = pa.Table.from_batches(waiting)
-                    yield tables.of_arrow(name, table.slice(0, rows), before), unknown
-                    before, held = before + rows, held - rows
-                    waiting = table.slice(rows).to_batches()
-            if held:
-                yield tables.of_arrow(name, pa.Table.from_batches(waiting), before), unknown
+                    yield tables.of_arrow(name, table.slice(0, rows), numbers[:rows]), unknown
+                    numbers, waiting = numbers[rows:], table.slice(rows).to_batches()
+            if len(numbers):
+                yield tables.of_arrow(name, pa.Table.from_batches(waiting), numbers), unknown
+
+    def _batches(
+        self, file: Any, rows: int, columns: list[str]
+    ) -> Iterator[tuple[pa.RecordBatch, Integers]]:
+        """Yield what is asked for of a Parquet file, at most so many rows at once, and which."""
+        begin = 0
+        for group in range(file.metadata.num_row_groups):
+            end = begin + file.metadata.row_group(group).num_rows
+            if self.share is not None and not self.share.count(end) > self.share.count(begin):
+                begin = end
+                continue
+            for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
+                there = np.arange(begin, begin + len(batch))
+                if self.share is not None:
+                    there = self.share.rows(begin, begin + len(batch))
+                    some = batch.take(pa.array(there - begin))
+                else:
+                    some = batch
+                begin += len(batch)
+                yield some, there
 
     def _of_text(self, rows: int) -> Iterator[tuple[tables.Table, list[str]]]:
         known = (*pairs.KNOWN, *schemas.PAIRS.columns)
-        before, held = 0, None
+        held = None
         for table in self._by_lines(rows):
             held = table if held is None else _joined(held, table)
             # Comments and empty lines are no rows: pieces of so many lines may hold fewer.
             while len(held) >= rows:
-                yield replace(_some(held, slice(0, rows)), before=before), _unknown(held, known)
-                before += rows
+                yield _some(held, slice(0, rows)), _unknown(held, known)
                 held = _some(held, slice(rows, None))
         if held is not None and len(held):
-            yield replace(held, before=before), _unknown(held, known)
+            yield held, _unknown(held, known)
 
     def _by_lines(self, rows: int) -> Iterator[tables.Table]:
-        above = 0
+        above = before = 0
         for head, body in _cut(self.path, rows):
-            if any(line.strip()[:1] not in (b"", b"#") for line in body.splitlines()):
-                try:
-                    table = tables.read(Source(str(self.path), head + body))
-                except InputError as error:
-                    raise InputError(_further(str(error), above)) from None
-                assert table.lines is not None
-                yield replace(table, lines=table.lines + above)
-            above += body.count(b"\n")
+            begins, ends = _lines_of(body)
+            lines = np.flatnonzero(_are_rows(body, begins))
+            there = np.arange(before, before + len(lines))
+            text, of = body, np.arange(len(begins))
+            if self.share is not None:
+                there = self.share.rows(before, before + len(lines))
+                of = lines[there - before]
+                text = b"".join([body[begins[line] : ends[line]] for line in of.tolist()])
+            if len(there):
+                yield self._parted(head, text, of + above + 1, there)
+            before += len(lines)
+            above += len(begins)
+
+    def _parted(self, head: bytes, text: bytes, lines: Integers, rows: Integers) -> tables.Table:
+        """Part rows of a text, whose lines follow the head in the file by so many lines."""
+        before = head.count(b"\n")
+        try:
+            table = tables.read(Source(str(self.path), head + text))
+        except InputError as error:
+            raise InputError(_further(str(error), before, lines)) from None
+        assert table.lines is not None
+        return replace(table, lines=before + lines[table.lines - before - 1], rows=rows)
 
 
 def _unknown(table: tables.Table, known: Collection[str]) -> list[str]:
@@ -168,22 +246,51 @@ def _joined(one: tables.Table, other: tables.Table) -> tables.Table:
     """Return the rows of two pieces of a text as one."""
     assert one.lines is not None
     assert other.lines is not None
+    assert one.rows is not None
+    assert other.rows is not None
     columns = {
         name: pa.concat_arrays([values, other.columns[name]])
         for name, values in one.columns.items()
     }
-    return replace(other, columns=columns, lines=np.concatenate([one.lines, other.lines]))
+    return replace(
+        other,
+        columns=columns,
+        lines=np.concatenate([one.lines, other.lines]),
+        rows=np.concatenate([one.rows, other.rows]),
+    )
 
 
 def _some(table: tables.Table, rows: slice) -> tables.Table:
     assert table.lines is not None
+    assert table.rows is not None
     columns = {name: values[rows] for name, values in table.columns.items()}
-    return replace(table, columns=columns, lines=table.lines[rows])
+    return replace(table, columns=columns, lines=table.lines[rows], rows=table.rows[rows])
 
 
-def _further(text: str, lines: int) -> str:
-    """Return a message about a piece with the lines of the whole."""
-    return re.sub(r"\bline (\d+)", lambda found: f"line {int(found[1]) + lines}", text)
+def _further(text: str, head: int, lines: Integers) -> str:
+    """Return a message about a piece with the lines of the whole, after so many of a head."""
+
+    def there(found: re.Match[str]) -> str:
+        line = int(found[1])
+        return f"line {line if line <= head else head + lines[line - head - 1]}"
+
+    return re.sub(r"\bline (\d+)", there, text)
+
+
+def _lines_of(body: bytes) -> tuple[Integers, Integers]:
+    """Where the lines of a text begin and, with their ends, end."""
+    ends = np.flatnonzero(np.frombuffer(body, dtype=np.uint8) == ord("\n")) + 1
+    if body and not body.endswith(b"\n"):
+        ends = np.append(ends, len(body))
+    return np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)], ends
+
+
+def _are_rows(body: bytes, begins: Integers) -> Booleans:
+    """Tell which lines are neither empty nor of comment."""
+    rows = np.ones(len(begins), dtype=bool)
+    for line in np.flatnonzero(_BLANK[np.frombuffer(body, dtype=np.uint8)[begins]]).tolist():
+        rows[line] = _PASSED_OVER.match(body, begins[line]) is None
+    return rows
 
 
 def opened(path: Location) -> PairStream | None:

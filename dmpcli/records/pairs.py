@@ -52,8 +52,8 @@ class PairTable:
         Where the table itself says on which surface each pair lies.
     unknown : list of str
         Columns that nobody reads.
-    before : int
-        Rows of the file before these, where it is read in pieces.
+    rows : array of int, shape (B,), optional
+        Which rows of the whole table these are, counted from 0 and rising, where they are not all.
     """
 
     name: str
@@ -64,14 +64,21 @@ class PairTable:
     status: list[str]
     places: PairPlaces | None = None
     unknown: list[str] = field(default_factory=list)
-    before: int = 0
+    rows: Integers | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def place(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        if self.lines is not None:
+            return f"line {self.lines[row]}"
+        return f"row {self.numbers[row] + 1}"
+
+    @property
+    def numbers(self) -> Integers:
+        """Which rows of the whole table these are, counted from 0, shape (B,)."""
+        return np.arange(len(self)) if self.rows is None else self.rows
 
     @property
     def good(self) -> Booleans:
@@ -127,7 +134,7 @@ def decoded(table: Table) -> PairTable:
         status,
         pair_places.read(table, status),
         [name for name in table.columns if name not in known],
-        table.before,
+        table.rows,
     )
 
 
@@ -166,7 +173,8 @@ def _rotations(table: Table, names: tuple[str, ...], status: list[str]) -> Float
 
 def _ids(table: Table) -> list[str]:
     if "id" not in table.columns:
-        return [str(table.before + row + 1) for row in range(len(table))]
+        numbers = np.arange(len(table)) if table.rows is None else table.rows
+        return [str(number) for number in (numbers + 1).tolist()]
     ids = table.texts("id")
     odd = next((row for row, name in enumerate(ids) if _CONTROL.search(name)), None)
     if odd is not None:

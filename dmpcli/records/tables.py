@@ -60,8 +60,8 @@ class Table:
         The decimal sign of its text.
     remarks : tuple of str
         What a person should know of how it was read.
-    before : int
-        Rows of the file before these, where it is read in pieces.
+    rows : array of int, shape (rows,), optional
+        Which rows of the file these are, counted from 0, where they are not all.
     """
 
     name: str
@@ -69,14 +69,16 @@ class Table:
     lines: Integers | None = None
     decimal: str = "."
     remarks: tuple[str, ...] = ()
-    before: int = 0
+    rows: Integers | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def at(self, row: int) -> str:
         """Return how a person finds row `row`, counted from 0."""
-        return f"row {self.before + row + 1}" if self.lines is None else f"line {self.lines[row]}"
+        if self.lines is not None:
+            return f"line {self.lines[row]}"
+        return f"row {(row if self.rows is None else self.rows[row]) + 1}"
 
     def numbers(self, column: str) -> Floats:
         """Return a column as finite numbers, shape (rows,).
@@ -219,12 +221,12 @@ def _parquet(source: Source) -> Table:
     return of_arrow(source.name, parquet.table(source))
 
 
-def of_arrow(name: str, table: Any, before: int = 0) -> Table:
-    """Return an Arrow table, perhaps a piece of a file, as a `Table`."""
+def of_arrow(name: str, table: Any, rows: Integers | None = None) -> Table:
+    """Return an Arrow table, or these rows of a file, as a `Table`."""
     columns: dict[str, Any] = {}
     for column in table.column_names:
         columns |= list_columns.expanded(column, table.column(column).combine_chunks())
-    return Table(name, columns, before=before)
+    return Table(name, columns, rows=rows)
 
 
 def _csv(

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
+from threading import Event
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +18,7 @@ from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.report_surface import AT_ONCE
 from dmpcli.reporting.stroke import LEAST, ReportedStroke
 from dmpcli.reporting.stroke_block import MeasuredBlock, StrokeBlock, gathered
+from dmpcli.surfaces.strip_settling import Course
 
 _SAMPLES = 1 << 16
 """Samples worked on at once: what is in work stays in the processor's cache."""
@@ -49,7 +51,10 @@ def measured_parts(
     InputError
         A part is damaged, is not the batch's, or holds a stroke that cannot be measured.
     """
-    tasks = (partial(_measured, *some) for some in _blocks(batch, label, sight, only))
+    tasks = (
+        partial(course.measured, course.takes(), *some)
+        for course, some in _blocks(batch, label, sight, only)
+    )
     if threads == 1:
         return (task() for task in tasks)
     return _in_turn(tasks)
@@ -60,7 +65,7 @@ def strokes_of_rows(
 ) -> dict[int, ReportedStroke]:
     """Read some strokes of a batch by row, as they are drawn; see `measured_parts`."""
     found: dict[int, ReportedStroke] = {}
-    for some in _blocks(batch, label, sight, rows):
+    for _, some in _blocks(batch, label, sight, rows):
         block = _block(*some)
         strokes = block.strokes(range(len(block.rows)))
         found |= dict(zip(block.rows.tolist(), strokes, strict=True))
@@ -71,9 +76,36 @@ _Some = tuple[BatchFolder, Piece, Integers, Floats, str, MeasurementContext, int
 """Strokes of a piece that share their times and the surface of this number; see `StrokeBlock`."""
 
 
+class _SharedCourse:
+    """The course of a piece's strokes that share their times: always told by their first block.
+
+    So what is measured does not depend on how many blocks are measured at once.
+    """
+
+    def __init__(self) -> None:
+        self._course, self._known = Course(), Event()
+        self._begun = False
+
+    def takes(self) -> bool:
+        """Tell whether a block is the first."""
+        first, self._begun = not self._begun, True
+        return first
+
+    def measured(self, first: bool, *some: *_Some) -> MeasuredBlock:
+        """Measure a block; the first ones are begun first."""
+        if not first:
+            self._known.wait()
+            return _block(*some).measured(self._course)
+        try:
+            return _block(*some).measured(self._course)
+        finally:
+            self._course.told = True
+            self._known.set()
+
+
 def _blocks(
     batch: BatchFolder, label: str, sight: MeasurementContext, only: Integers | None
-) -> Iterator[_Some]:
+) -> Iterator[tuple[_SharedCourse, _Some]]:
     lying = sight.ground is not None or sight.grounds is not None
     more = (*schemas.NORMAL, *schemas.EULER_ANGLES) if lying else schemas.NORMAL
     # On planes kernels have no charts in hand.
@@ -84,11 +116,12 @@ def _blocks(
         for which, t in _alike(piece):
             if only is not None:
                 which = which[np.isin(piece.rows[which], only)]
-            size = max(1, _SAMPLES // len(t))
+            course, size = _SharedCourse(), max(1, _SAMPLES // len(t))
             size = min(size, AT_ONCE) if curved else size
             for number, those in _apart(batch, piece, which, sight):
                 for first in range(0, len(those), size):
-                    yield batch, piece, those[first : first + size], t, label, sight, number
+                    some = those[first : first + size]
+                    yield course, (batch, piece, some, t, label, sight, number)
 
 
 def _apart(
@@ -101,10 +134,6 @@ def _apart(
     on = sight.grounds.of(batch.ids.take(pa.array(piece.rows[which])).to_pylist())
     for number in np.unique(on).tolist():
         yield number, which[on == number]
-
-
-def _measured(*some: *_Some) -> MeasuredBlock:
-    return _block(*some).measured()
 
 
 def _block(

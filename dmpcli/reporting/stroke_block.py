@@ -19,6 +19,7 @@ from dmpcli.reporting.strokes import role_of
 from dmpcli.spatial import rotations
 from dmpcli.surfaces import plane
 from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.strip_settling import Course
 
 FIGURES = (
     *("wave_height", "wave_spread", "nearest_rms", "nearest_max", "phase_rms", "phase_max"),
@@ -143,8 +144,8 @@ class StrokeBlock:
             axes[i] = plane.closed_axes(normal[i])
         return np.isfinite(axes[:, 0, 0]), axes
 
-    def measured(self) -> MeasuredBlock:
-        """Measure the strokes."""
+    def measured(self, course: Course | None = None) -> MeasuredBlock:
+        """Measure the strokes, which may have a course in common on curved surfaces."""
         table = np.full((len(self.rows), len(FIGURES)), np.nan)
         column = {name: table[:, i] for i, name in enumerate(FIGURES)}
         compiled, every = self.sight.compiled, bool(self.known.all())
@@ -172,7 +173,7 @@ class StrokeBlock:
         at = self.sight.reference
         length = 1.0 if at is None else at.length
         lies = placed_block.placed(
-            self._as_block(), self.ground.surface, self.sight.heights, length
+            self._as_block(), self.ground.surface, self.sight.heights, length, course
         )
         for key, values in lies.figures.items():
             column[f"surface_{key}"][:] = values

@@ -13,6 +13,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import strip_inverse
 from dmpcli.surfaces.mesh_charts import MeshCharts
 from dmpcli.surfaces.plane import PlaneCharts
+from dmpcli.surfaces.strip_settling import Course
 from dmpcli.surfaces.surface import Charts, Status
 from dmpcli.surfaces.tangential import NEAR, Sought, solved
 
@@ -119,22 +120,25 @@ def invert(charts: Charts, position: Floats) -> Inverse:
     return result
 
 
-def on_strips(charts: MeshCharts, position: Floats) -> Inverse:
-    """Find coordinates as `invert` does, of the strokes that are found on strips alone."""
+def on_strips(charts: MeshCharts, position: Floats, course: Course | None = None) -> Inverse:
+    """Find coordinates as `invert` does, of the strokes that are found on strips alone.
+
+    If they are one skill's they may have one course: see `strip_inverse.found`.
+    """
     shape = position.shape[:2]
     rows = np.flatnonzero(charts.status == Status.DRAWN)
     if len(rows) == 0 or shape[1] == 0:
         return _of_strips(_nothing(shape[1]), shape)
     every = len(rows) == len(position)
-    whole = _whole(charts if every else charts.rows(rows), position[rows])
+    whole = _whole(charts if every else charts.rows(rows), position[rows], course)
     if len(whole.rows) == len(position):
         return _all_of_strips(whole)
     return _of_strips(replace(whole, rows=rows[whole.rows]), shape)
 
 
-def _whole(charts: MeshCharts, given: Floats) -> strip_inverse.Found:
+def _whole(charts: MeshCharts, given: Floats, course: Course | None = None) -> strip_inverse.Found:
     """Strokes that are found on strips, and stay on one turn about the part."""
-    whole = strip_inverse.found(charts, given)
+    whole = strip_inverse.found(charts, given, course)
     return whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
 
 

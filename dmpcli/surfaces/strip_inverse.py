@@ -23,7 +23,7 @@ from dmpcli.spatial.vectors import cross, dot, length, unit
 from dmpcli.surfaces import strip_settling
 from dmpcli.surfaces.mesh_charts import MeshCharts
 from dmpcli.surfaces.strip_pieces import strips
-from dmpcli.surfaces.strip_settling import FAR, PASSES
+from dmpcli.surfaces.strip_settling import FAR, PASSES, Course
 from dmpcli.surfaces.surface import Status
 from dmpcli.surfaces.tangential import SETTLED
 
@@ -64,7 +64,7 @@ class Found:
         return Found(self.rows[which], self.coordinates[which], self.axes[which], self.miss[which])
 
 
-def found(charts: MeshCharts, position: Floats) -> Found:
+def found(charts: MeshCharts, position: Floats, course: Course | None = None) -> Found:
     """Find chart coordinates of strokes on the mesh or next to it; only of those found whole.
 
     Parameters
@@ -72,6 +72,9 @@ def found(charts: MeshCharts, position: Floats) -> Found:
     charts : MeshCharts
     position : array, shape (B, T, 3)
         mm.
+    course : Course, optional
+        Of strokes that one skill drew: kernels spare walks by it, and what they find of a stroke
+        hangs on those that told it by rounding (1e-9 mm).
     """
     open_ = charts.lengths > 0.0
     rows = np.flatnonzero(open_ & ~charts.creased & (charts.status == Status.DRAWN))
@@ -81,7 +84,9 @@ def found(charts: MeshCharts, position: Floats) -> Found:
     some = charts.rows(rows)
     walked = None
     if charts.mesh.compiled:
-        at, good, walked = strip_settling.settled(some, foot, facet, _along_chord(some, foot))
+        at, good, walked = strip_settling.settled(
+            some, foot, facet, _along_chord(some, foot), course
+        )
     else:
         at = _guessed(some, foot)
         good = _settled(some, at, foot, facet)

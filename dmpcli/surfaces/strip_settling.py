@@ -25,10 +25,44 @@ FAR = 1e4
 _SAME_WIDTH, _BESIDE = (2e-7, 1e-4), (0.1, 0.02)
 # Samples that tell the width.
 _FARTHEST = 8
+# Strokes that tell the course of those alike, and by how much theirs may differ, mm.
+_TELLING, _ONE_COURSE = 2, 1e-6
+
+
+class Course:
+    """What strokes in their charts have in common: u by the length of the chart, and v.
+
+    What one skill draws has one course, whatever its start and goal and the surface: it is the
+    chart that bends.
+
+    Attributes
+    ----------
+    place : array, shape (T, 2), or None
+        Where there is one; v in mm.
+    told : bool
+        Whether it was looked for.
+    """
+
+    def __init__(self) -> None:
+        self.place: Floats | None = None
+        self.told = False
+
+    def tell(self, at: Floats, lengths: Floats, good: bool) -> None:
+        """Look for it in coordinates (R, T, 2) in charts of lengths (R,), if they are good."""
+        self.told = True
+        course = np.stack([at[..., 0] / lengths[:, None], at[..., 1]], axis=-1)
+        apart = np.abs(course - course[0]).max(axis=(0, 1))
+        # What is no number is not below it.
+        if good and apart[0] * lengths.max() < _ONE_COURSE and apart[1] < _ONE_COURSE:
+            self.place = course[0]
 
 
 def settled(
-    charts: MeshCharts, foot: Floats, facet: Floats, ends: tuple[Floats, Floats]
+    charts: MeshCharts,
+    foot: Floats,
+    facet: Floats,
+    ends: tuple[Floats, Floats],
+    course: "Course | None" = None,
 ) -> tuple[Floats, Booleans, list[WalkedStrips]]:
     """Find coordinates over feet.
 
@@ -39,6 +73,9 @@ def settled(
         Feet, mm, and the normals of their facets.
     ends : arrays, shape (R,)
         From which to which u the centre lines are wanted, mm.
+    course : Course, optional
+        What the strokes may have in common: the first that are asked tell it, if none did before.
+        What it says is not taken of strokes for which it does not hold.
 
     Returns
     -------
@@ -49,6 +86,57 @@ def settled(
     walked : list of WalkedStrips
         Their strips, by rows among the good ones.
     """
+    count = len(foot)
+    at, good, walked = np.empty((*foot.shape[:2], 2)), np.zeros(count, dtype=bool), []
+
+    def seek(rows: Integers) -> None:
+        some = charts.rows(rows), foot[rows], facet[rows], (ends[0][rows], ends[1][rows])
+        at[rows], good[rows], found = _sought(*some)
+        walked.extend(replace(strips, rows=rows[strips.rows]) for strips in found)
+
+    left = np.arange(count)
+    if course is not None and not course.told and count >= _TELLING:
+        telling, left = left[:_TELLING], left[_TELLING:]
+        seek(telling)
+        course.tell(at[telling], charts.lengths[telling], bool(good[telling].all()))
+    if course is not None and course.place is not None and len(left):
+        found = _on_course(charts.rows(left), foot[left], facet[left], course.place)
+        at[left], good[left] = found[:2]
+        walked.extend(replace(strips, rows=left[strips.rows]) for strips in found[2])
+        left = left[~found[1]]
+    if len(left):
+        seek(left)
+    # As they are counted among the good ones alone.
+    number_of = np.cumsum(good) - 1
+    return at, good, [replace(strips, rows=number_of[strips.rows]) for strips in walked]
+
+
+def _on_course(
+    charts: MeshCharts, foot: Floats, facet: Floats, course: Floats
+) -> tuple[Floats, Booleans, list[WalkedStrips]]:
+    """Find coordinates over feet of strokes that have a known course; see `settled`.
+
+    Their strips are walked once, for the course. Good are those for which the same nodes would be
+    walked again, as in the last pass of `_sought`.
+    """
+    at = np.stack(
+        [course[:, 0] * charts.lengths[:, None], np.tile(course[:, 1], (len(foot), 1))], axis=-1
+    )
+    good, walked, reach = np.zeros(len(at), dtype=bool), [], _extent(at)
+    for some, strip in strips(charts, at, reach, beside=_BESIDE[1]):
+        at[some], still = strip.moved(foot[some], facet[some], rough=False)
+        same = strip.same(_extent(at[some]), reach[some], _SAME_WIDTH[0])
+        kept = np.flatnonzero(still & strip.covers(at[some]) & same)
+        good[some[kept]] = True
+        if len(kept):
+            walked.append(strip.walked(some[kept], kept))
+    return at, good, walked
+
+
+def _sought(
+    charts: MeshCharts, foot: Floats, facet: Floats, ends: tuple[Floats, Floats]
+) -> tuple[Floats, Booleans, list[WalkedStrips]]:
+    """Find coordinates over feet of strokes that may be anywhere; their strips by their rows."""
     from dmpcli.surfaces.kernels import inverse
 
     lines, step = _centre_lines(charts, *ends), charts.centre.step[:, 0]
@@ -82,9 +170,7 @@ def settled(
         if number == 0 and len(left):
             _narrow(charts, at, left, foot, facet, lines)
         reach = _extent(at[left])
-    # As they are counted among the good ones alone.
-    number_of = np.cumsum(good) - 1
-    return at, good, [replace(strips, rows=number_of[strips.rows]) for strips in walked]
+    return at, good, walked
 
 
 def _centre_lines(charts: MeshCharts, least: Floats, most: Floats) -> CentreLines:

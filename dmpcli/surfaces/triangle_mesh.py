@@ -205,7 +205,14 @@ class TriangleMesh:
 
     def search(self, points: Floats) -> tuple[Floats, Integers]:
         """Closest points (N, 3), mm, and their faces (N,); quickest in the order of a path."""
-        return self._facets.search(points)
+        if not self.compiled:
+            return self._facets.search(points)
+        from dmpcli.surfaces.kernels import tree
+
+        foot, face, doubt = tree.search(self.facets, np.ascontiguousarray(points, dtype=float))
+        if doubt.any():
+            foot[doubt], face[doubt] = self._facets.search(points[doubt])
+        return foot, face
 
     def smooth_normals(self, position: Floats, face: Integers) -> Floats:
         """Unit normals (N, 3) at points of faces, interpolated between the corners'."""

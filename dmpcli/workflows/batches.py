@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 from dmpcli.batch.part import Job
 from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, BatchSummary, Shard, run
@@ -13,7 +14,7 @@ from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
 from dmpcli.messages import heard, progress, tell, tell_as, warn
 from dmpcli.records import file_io, pair_stream, trajectory
-from dmpcli.records.pair_stream import PairStream
+from dmpcli.records.pair_stream import PairStream, Share
 from dmpcli.records.pairs import KNOWN, PairTable
 from dmpcli.records.record import Form
 from dmpcli.records.storage import Location
@@ -34,6 +35,7 @@ def write_pieces(
     prepare: Callable[[PairTable], Ready],
     output: Location,
     wanted: BatchOptions,
+    alone: bool = False,
 ) -> None:
     """Draw a table piece by piece into a folder, and say what became of it.
 
@@ -44,6 +46,9 @@ def write_pieces(
         Checks a piece and makes it ready.
     output : Path or ObjectPath
     wanted : BatchOptions
+    alone : bool
+        Whether nothing but its own row decides what is drawn of a pair: then a shard reads and
+        checks no rows but its own.
 
     Raises
     ------
@@ -53,6 +58,10 @@ def write_pieces(
     rows = max(
         wanted.pairs_per_part, pair_stream.ROWS // wanted.pairs_per_part * wanted.pairs_per_part
     )
+    shard = Shard(*wanted.share)
+    whole = stream
+    if alone and not shard.whole:
+        stream = replace(stream, share=Share(wanted.pairs_per_part, shard.has))
     stream.check_ids(rows)
     if wanted.stop:
         with heard():  # it is told as they are drawn
@@ -60,8 +69,14 @@ def write_pieces(
                 prepare(table)
     told: set[str] = set()
 
+    def pieces() -> Iterator[PairTable]:
+        found = stream.pieces(rows)
+        first = next(found, None)
+        # A share that has no part has nothing to draw, and tells so.
+        yield from whole.pieces(rows) if first is None else chain([first], found)
+
     def readies() -> Iterator[Ready]:
-        for number, table in enumerate(stream.pieces(rows)):
+        for number, table in enumerate(pieces()):
             if number == 0:
                 tell_of_unknown(table)
             with heard() as said:
@@ -73,12 +88,8 @@ def write_pieces(
             yield ready
 
     nested = stream.rows > MOST_IN_ONE * wanted.pairs_per_part
-    _tell(
-        str(stream.path),
-        output,
-        Shard(*wanted.share),
-        _drawn(readies(), output, wanted, nested, stream.rows),
-    )
+    summary = _drawn(readies(), output, wanted, nested, stream.asked)
+    _tell(str(stream.path), output, shard, summary)
 
 
 def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> BatchSummary:
@@ -111,6 +122,8 @@ def _batches(
     first_part = 0
     for ready in readies:
         own = replace(_job(ready, output, wanted), nested=nested)
+        if ready.sites is None and len(ready.table):
+            first_part = int(ready.table.numbers[0]) // wanted.pairs_per_part
         if job is None:
             job = own
             _try(ready)

@@ -21,6 +21,7 @@ from dmpcli.records.record import Provenance
 from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.spatial import output_events
 from dmpcli.spatial.output_events import AskedEvent
+from dmpcli.surfaces.plane import Plane
 from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize_inputs import (
@@ -157,6 +158,21 @@ def prepared(order: Order) -> Ready:
         durations(skill, table.duration, settings),
         Provenance("generalize", options, tuple(inputs), taught),
     )
+
+
+def each_alone(order: Order) -> bool:
+    """Tell whether nothing but its own row of the table decides what is drawn of a pair.
+
+    A plane is seen from the side of the tools of a table, and a skill that does not know its side
+    is turned over where all pairs see it so; copies are numbered through.
+    """
+    if order.settings.copies is not None:
+        return False
+    if order.surface is None:
+        return True
+    own_tools = order.table.pairs.start_rotation is not None
+    on_plane = isinstance(order.surface.surface, Plane)
+    return not order.skill.side_guessed and not (on_plane and own_tools)
 
 
 def asked_events(settings: GeneralizeSettings) -> tuple[AskedEvent, ...]:

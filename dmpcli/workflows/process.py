@@ -145,6 +145,7 @@ def copied(table: "PairTable", settings: "GeneralizeSettings") -> "PairTable":
         ids=ids,
         pairs=copies.copied(table.pairs, count, settings.spacing or 0.0),
         lines=None if table.lines is None else np.repeat(table.lines, count),
+        rows=np.add.outer(table.numbers * count, np.arange(count)).ravel(),
         duration=np.repeat(table.duration, count),
         status=[status for status in table.status for _ in range(count)],
         places=None if places is None else replace(places, of=np.repeat(places.of, count)),

@@ -60,6 +60,7 @@ def swings_of(gains, stiffness, cycles, mass, seconds=10.0):
     return early.max(), late.max()
 
 
+@pytest.mark.sweep(kept=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("mass", [1e-6, 0.6, 3.0])
 @pytest.mark.parametrize("cycles", [0, 2, 4])

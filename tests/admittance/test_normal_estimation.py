@@ -39,6 +39,7 @@ WAVE = np.column_stack([-10.0 * T, 25.0 * np.sin(2 * np.pi * T / 10.0)])
 LINE = np.column_stack([-15.0 * T, 0.0 * T])
 
 
+@pytest.mark.sweep(kept=4)
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [WAVE, LINE], ids=["wave", "line"])
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 5.0])

@@ -85,7 +85,7 @@ def test_without_noise_the_truth_comes_back():
     assert found.used.all()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_twelve_poses_keep_the_bounds_with_a_real_sensors_noise_and_none_is_left_out():
     for seed in range(100):
         found = identify(tilted(), noisy(tilted(), seed))
@@ -140,7 +140,7 @@ def test_an_independent_solver_of_the_whole_nonlinear_model_agrees(seed):
     np.testing.assert_allclose(found.zero, judged[6:], atol=5e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_standard_errors_are_those_of_many_repetitions():
     found = [identify(tilted(), noisy(tilted(), seed)) for seed in range(200)]
     for name in ("weight", "centre", "inclination", "zero"):

@@ -55,7 +55,7 @@ def scheduler(tmp_path):
             process.wait()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_bytes_are_those_of_one_machine_also_when_a_worker_dies(learned, tmp_path, scheduler):
     address, workers = scheduler
     table = write_pairs(tmp_path / "p.csv", 3000)

@@ -11,7 +11,7 @@ from dmpcli.batch import cut
 @pytest.mark.slow
 @given(st.integers(1, 60), st.integers(1, 70))
 def test_without_surfaces_the_order_is_that_of_the_table(rows, size):
-    found = cut.in_order(rows, size)
+    found = cut.in_order(np.arange(rows), size)
     assert found.count == -(-rows // size)
     joined = np.concatenate([found.rows(n) for n in range(found.count)])
     np.testing.assert_array_equal(joined, np.arange(rows))

@@ -32,6 +32,7 @@ def parts(store):
     return len([r for r in store.requests if r.startswith("PUT ") and "/part-" in r])
 
 
+@pytest.mark.thorough
 def test_the_only_worker_dies_and_another_one_that_comes_goes_on(learned, store, tmp_path):
     table = write_pairs(tmp_path / "p.csv", 2000)
     subprocess.run(words_of(learned, table, tmp_path / "here"), check=True)

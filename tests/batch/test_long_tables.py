@@ -1,5 +1,7 @@
 """A table that is drawn a piece at a time gives the parts of one that is drawn whole."""
 
+import numpy as np
+import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 
@@ -8,6 +10,7 @@ from tests.batch.test_run import content, run, write_pairs
 from tests.batch.test_run import learned as learned
 
 SKIP = ("--on-error", "skip")
+PLANE = '{"point": [0, 0, 0], "normal": [0, 0, 1]}'
 
 
 @pytest.fixture
@@ -57,3 +60,66 @@ def test_a_bad_pair_in_the_last_piece_stops_before_anything_is_written(
     table = write_pairs(tmp_path / "p.csv", 230, bad=(229,))
     assert "line 231" in run(learned, tmp_path / "b", table, code=2)
     assert not (tmp_path / "b").exists()
+
+
+def parts_of(folder):
+    return {name: bytes_ for name, bytes_ in content(folder).items() if name.startswith("part-")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("groups", [None, 10, 70, 1000])
+def test_shards_draw_the_parts_of_the_whole_whatever_the_tables_row_groups(
+    learned, tmp_path, monkeypatch, groups
+):
+    monkeypatch.setattr(pair_stream, "STREAMED_ROWS", 0)
+    monkeypatch.setattr(pair_stream, "STREAMED", 0)
+    monkeypatch.setattr(pair_stream, "ROWS", 100)
+    table = write_pairs(tmp_path / "p.csv", 330, bad=(60, 329))
+    if groups is not None:
+        cells = pyarrow.csv.read_csv(table)
+        table = tmp_path / "p.parquet"
+        pq.write_table(cells, table, row_group_size=groups)
+    run(learned, tmp_path / "whole", table, *SKIP)
+    for shard in ("1/9", "2/3", "1/3", "3/3"):  # the last of nine has no part
+        run(learned, tmp_path / "b", table, *SKIP, "--shard", shard)
+    assert parts_of(tmp_path / "b") == parts_of(tmp_path / "whole")
+    told = run(learned, tmp_path / "b", table, *SKIP)
+    assert "7 of 7 parts were there already" in told
+    assert content(tmp_path / "b") == content(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_shard_checks_its_own_rows_and_the_last_run_all(learned, tmp_path, in_pieces):
+    table = write_pairs(tmp_path / "p.csv", 230, bad=(120,))
+    run(learned, tmp_path / "b", table, "--shard", "1/2", code=2)
+    assert "line" not in run(learned, tmp_path / "b", table, "--shard", "2/2")
+    assert "line 122" in run(learned, tmp_path / "b", table, code=2)
+
+
+@pytest.mark.slow
+def test_a_shard_without_a_part_says_so(learned, tmp_path, in_pieces):
+    table = write_pairs(tmp_path / "p.csv", 60)
+    told = run(learned, tmp_path / "b", table, "--shard", "7/9")
+    assert "shard 7/9: 0 strokes drawn" in told
+
+
+@pytest.mark.slow
+def test_a_plane_seen_by_tools_of_the_table_is_seen_by_every_shard_as_by_all(
+    learned, tmp_path, in_pieces
+):
+    """Rows of one shard alone would turn the plane over."""
+    rng = np.random.default_rng(1)
+    start = np.column_stack([rng.uniform(-300, 300, (150, 2)), np.zeros(150)])
+    ends = np.hstack([start, start + [60.0, 20.0, 0.0]])
+    rows = []
+    for i, row in enumerate(ends.round(3).tolist()):
+        tool = [0, 0, 0] if 50 <= i < 100 else [np.pi, 0, 0]
+        rows.append(",".join(map(str, [*row, *tool])))
+    table = tmp_path / "p.csv"
+    table.write_text("\n".join(["x0,y0,z0,xg,yg,zg,rx0,ry0,rz0", *rows]) + "\n")
+    (tmp_path / "plane.json").write_text(PLANE)
+    options = [*SKIP, "--surface", tmp_path / "plane.json"]
+    run(learned, tmp_path / "whole", table, *options)
+    for shard in ("2/3", "1/3", "3/3"):
+        run(learned, tmp_path / "b", table, *options, "--shard", shard)
+    assert parts_of(tmp_path / "b") == parts_of(tmp_path / "whole")

@@ -151,6 +151,7 @@ def test_parts_of_other_options_are_not_kept(learned, whole, tmp_path, other):
     assert content(folder)["part-00000.parquet"] != files["part-00000.parquet"]
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -53,6 +53,7 @@ def test_a_pen_that_is_pressed_rests(tilt):
     assert np.linalg.norm(forces[-1]) > 3.0
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("k", [0.5, 20.0])
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.6])
@@ -143,6 +144,7 @@ def test_the_same_seed_reads_the_same_and_another_one_does_not():
     assert not np.allclose(one, other, atol=1e-6)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("native", "shape"),

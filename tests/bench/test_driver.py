@@ -208,7 +208,7 @@ def test_a_tool_file_that_is_not_the_benchs_tool_is_refused(stroke, tmp_path):
     assert not (tmp_path / "run.parquet").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_slow_stroke_over_a_step_on_a_described_arm_finds_the_surface_again(stroke, tmp_path):
     """The ball rolls down the edge, which pushes it on by twice what friction may be."""
     arm, truth, out = tmp_path / "arm.xml", tmp_path / "truth.parquet", tmp_path / "run.parquet"

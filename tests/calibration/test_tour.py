@@ -183,6 +183,7 @@ def test_an_arm_that_never_settles_is_named():
         bench.run()
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_compensation_leaves_of_a_later_motion_is_below_a_tenth_of_a_newton(seed):

@@ -468,6 +468,7 @@ def on_saddle(uv):
     return SADDLE.strip(start[None], first[None], flat[None], STEPS)[0][0]
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("taught", ["on_saddle 0", "on_saddle 40", "on_bow 600", "on_bow -600"])
 def test_what_is_taught_on_a_curved_part_is_drawn_on_any(lab, saddle, taught):

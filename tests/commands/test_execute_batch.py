@@ -325,7 +325,7 @@ def test_a_dry_run_tells_a_line_per_stroke_and_of_many_the_worst(batch, tmp_path
 # --- pressing
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_coupling_presses_during_strokes_only(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out, "--coupling", "force", "--force-setpoint", 5)

@@ -159,6 +159,7 @@ def test_any_number_fits_or_is_refused_in_a_line(recording, tmp_path, option, va
         assert f"{option} = " in done.stderr or "alpha_1 / tau" in done.stderr
 
 
+@pytest.mark.sweep(kept=8)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",

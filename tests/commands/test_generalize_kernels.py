@@ -48,7 +48,7 @@ def drawn(learned, shop, folder, *options):
     return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs(extras.FAST)
 def test_a_job_with_kernels_says_so_and_is_the_same_but_for_rounding(learned, shop, tmp_path):
     turning = ("--orientation", "surface")
@@ -65,7 +65,7 @@ def test_a_job_with_kernels_says_so_and_is_the_same_but_for_rounding(learned, sh
                 np.testing.assert_allclose(fast.columns[name], values, rtol=0, atol=1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs(extras.FAST)
 def test_a_job_that_goes_on_keeps_to_its_means_and_takes_the_parts_that_are_there(
     learned, shop, tmp_path, monkeypatch
@@ -138,7 +138,7 @@ def test_workers_of_a_job_with_kernels_are_asked_for_numba_and_no_others(monkeyp
     assert cluster.versions(kernels=True)["numba"] == "not installed"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs(extras.FAST)
 def test_the_first_compile_is_told_in_one_line(monkeypatch, caplog):
     from dmpcli.surfaces.kernels import ready

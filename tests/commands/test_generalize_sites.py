@@ -282,7 +282,7 @@ def test_options_of_surfaces_say_something(shop, tmp_path):
     assert len(list((tmp_path / "kept").iterdir())) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_report_holds_each_stroke_against_its_own_surface(shop, drawn, tmp_path):
     words = [drawn[1], "--pairs", drawn[0], "--json"]
     rows = json.loads(dmpcli("report", *words).stdout)["files"][0]["strokes"]

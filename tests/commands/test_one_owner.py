@@ -60,7 +60,7 @@ def test_a_second_command_leaves_the_stroke_of_the_first_alone(lab, tmp_path):
     assert ended(first)[0] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_what_a_crash_left_is_taken_over_once_the_arm_rests(lab, tmp_path):
     first = begun(lab, tmp_path, "first", 10.0)
     moving(lab)
@@ -72,7 +72,7 @@ def test_what_a_crash_left_is_taken_over_once_the_arm_rests(lab, tmp_path):
     assert "took over a transmission that was left open" in said
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_an_arm_that_plays_on_after_a_crash_is_not_cut_into(lab, tmp_path):
     first = begun(lab, tmp_path, "first", 20.0, "--allow-file-mode", mode="file")
     moving(lab)

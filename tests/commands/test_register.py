@@ -236,7 +236,7 @@ def test_where_nothing_near_the_start_fits_it_is_refused_with_the_pose_to_paste(
     assert_wedge(wedge_lab)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_part_that_looks_the_same_turned_over_is_refused_from_a_bad_start(lab):
     over = Rotation.from_matrix(R @ np.diag([-1.0, 0.6, -0.6]) @ R.T @ R).as_euler("XYZ")
     done = run("part.stl", "touched.csv", "-o", "pose.json", "--initial", 480, -60, 0, *over)

@@ -233,7 +233,9 @@ def written(output, *words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("means", ["pure", pytest.param("compiled", marks=needs(extras.FAST))])
+@pytest.mark.parametrize(
+    "means", ["pure", pytest.param("compiled", marks=[needs(extras.FAST), pytest.mark.thorough])]
+)
 def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder, means):
     one, two = (
         written(tmp_path / f"jobs-{jobs}", demo, folder, "--jobs", jobs, "--kernels", means)
@@ -243,7 +245,7 @@ def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder, m
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_kernels_print_what_numpy_prints_and_the_report_says_that_they_measured(
     tmp_path, demo, folder
 ):

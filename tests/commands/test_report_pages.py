@@ -156,7 +156,7 @@ def curved(tmp_path_factory):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs(VIEW)
 def test_a_part_is_drawn_and_can_be_turned_the_same_twice(curved):
     words = (curved["demo"], curved["along"], "--surface", curved["mesh"], "-o", curved["out"])

@@ -43,7 +43,7 @@ def files(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*")}
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_report_of_a_store_into_a_store_is_the_one_of_this_machine(here, store):
     place, demo, folder = here
     printed = ended("report", demo, folder, "-o", place / "out").stdout

@@ -31,6 +31,7 @@ def drawn(stiffness, cycles, seed=0, height=-1.5, **policy):
     return rig[0], rig[0].land().draw(12.0)
 
 
+@pytest.mark.sweep(kept=4)
 @pytest.mark.slow
 @pytest.mark.parametrize("cycles", [0, 1, 2, 4])
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
@@ -72,6 +73,7 @@ def test_a_surface_off_the_plan_is_landed_on_gently(height, stiffness):
     assert rig.states == ["free", "seeking", "landing", "drawing"]
 
 
+@pytest.mark.sweep(kept=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 10.0])

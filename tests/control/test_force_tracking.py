@@ -104,6 +104,7 @@ class LateArm:
         return forces
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("lookahead", [0.02, 0.1, 0.2, 0.3, 0.5])
 def test_the_force_settles_without_losing_contact_however_long_the_look_ahead(lookahead):

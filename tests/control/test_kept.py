@@ -545,6 +545,7 @@ def what_is_meant_where_nothing_is_said():
     ]
 
 
+@pytest.mark.sweep(kept=11)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):

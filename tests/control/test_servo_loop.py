@@ -615,6 +615,7 @@ def test_a_set_point_that_would_accelerate_too_much_is_not_sent():
     assert len(bench.servo.sent) == 300
 
 
+@pytest.mark.sweep(kept=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("at", range(3, 78, 5))
 def test_braking_never_breaks_the_limit_that_the_plan_keeps(at):

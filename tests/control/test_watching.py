@@ -185,7 +185,7 @@ def watched(tmp_path, *words, interrupt=None):
     return text.decode(errors="replace"), process.returncode
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_person_at_the_terminal_sees_the_run_and_every_message(tmp_path):
     written(tmp_path / "traj.parquet", columns(duration=10.0))
     words = ["execute", "traj.parquet", "-o", "run.parquet", "--realtime"]

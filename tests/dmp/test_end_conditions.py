@@ -17,6 +17,7 @@ def axis(k, d, tau=1.4):
     return TransformationGains(np.array([k]), np.array([d]), tau)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize(("k", "d"), [(100.0, 20.0), (30.0, 40.0), (200.0, 5.0)])
 @pytest.mark.parametrize(("count", "alpha_1"), [(2, 1.0), (9, 1.7), (40, 0.5)])

@@ -8,6 +8,7 @@ from dmpcli.dmp.canonical_system import phase
 from dmpcli.dmp.forced_model import forced_model
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "tau", "alpha_1"), [(2, 0.5, 1.0), (80, 0.5, 1.0), (30, 2.0, 3)])
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ def draw_at(skill, start, goal, duration=None):
     return draw(skill, pairs, seconds, None, GeneralizeOptions(rate=100.0))[0]
 
 
+@pytest.mark.sweep(kept=12)
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 @pytest.mark.parametrize(
@@ -43,6 +44,7 @@ def test_reproduction_stays_within_the_promised_share_of_the_diagonal(
         assert np.linalg.norm(ends, axis=1).max() <= 0.05
 
 
+@pytest.mark.sweep(kept=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 def test_new_pairs_keep_the_shape(shape):
@@ -87,6 +89,7 @@ def test_the_set_holds_what_the_promise_is_about():
     assert moving >= 80
 
 
+@pytest.mark.sweep(kept=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes())
 def test_strokes_that_end_where_they_began_keep_their_shape_and_reach_their_goal(shape):

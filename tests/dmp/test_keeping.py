@@ -167,6 +167,7 @@ def test_mirroring_a_recording_mirrors_the_drawn_stroke(name):
     np.testing.assert_allclose(new.position, old.position @ MIRROR, atol=1e-5)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["timing", "shaken", "walls"])
 def test_the_order_of_demonstrations_changes_nothing(kind):

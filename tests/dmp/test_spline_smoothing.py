@@ -56,6 +56,7 @@ def test_least_squares_on_unequal_intervals_agree_with_scipys():
     np.testing.assert_allclose(ours.coefficients(x), theirs.c, atol=1e-9)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("rate", [8.5, 20.0, 100.0, 300.0])
@@ -79,6 +80,7 @@ def test_the_wave_is_smoothed_to_a_part_of_its_noise(sigma, rate):
     assert np.quantile(ratios, 0.95) <= 1.5
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("stroke", [corners, pen_lift])

@@ -61,6 +61,7 @@ def skill(request):
     return fit([paper_stroke(turning=True)], choices).skill
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 def test_roll_out_equals_solve_ivp_of_the_same_equations(skill):
     t = np.linspace(0.0, skill.duration, 501)

@@ -140,6 +140,7 @@ def run(line, variables):
             Path(out).write_bytes(stdin)
 
 
+@pytest.mark.sweep(kept=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_the_examples_of_a_page_run(page, shared, tmp_path, monkeypatch):

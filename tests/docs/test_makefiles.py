@@ -24,7 +24,7 @@ def make(folder, *words, code=0):
     return done
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_batch_that_users_copy(tmp_path):
     folder = tmp_path / "batch"
     shutil.copytree(ROOT / "sample_runs" / "batch", folder, ignore=shutil.ignore_patterns("out"))

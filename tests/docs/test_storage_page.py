@@ -46,7 +46,7 @@ def store():
         yield running
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_job_array_draws_a_batch_though_a_task_is_killed(learned, store, tmp_path):
     table = write_pairs(tmp_path / "pairs.csv", 2100, bad=(60,))
     here = tmp_path / "here"

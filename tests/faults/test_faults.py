@@ -27,6 +27,7 @@ def test_invariants_hold_whatever_fails():
     hold(FEW)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, len(MORE), 30))
 def test_invariants_hold_for_every_kind_of_fault_on_many_a_command(first):
@@ -53,6 +54,7 @@ def test_a_seed_replays_its_run():
     assert (once.faults, once.code, once.told) == (again.faults, again.code, again.told)
 
 
+@pytest.mark.sweep(kept=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_defect_is_found(name, monkeypatch):
@@ -75,7 +77,7 @@ def test_events_happen_in_order_and_sleepers_are_overtaken():
     assert (seen[-1], world.now()) == (("b", 2.0), 3.0)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_bias_that_somebody_sets_moves_the_arm_no_further_than_15_mm_whatever_its_size():
     hold_all = [run(seed, ("sensor_biased",), "record") for seed in range(24)]
     assert not [told(finding) for finding in hold_all if finding.wrong]

@@ -146,7 +146,7 @@ def test_a_description_that_does_not_fit_its_data_is_refused(tmp_path, was, beco
         lerobot_dataset.read(tmp_path / "ds", None)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["type_of_another_column", "signalling_nan"])
 def test_a_damaged_table_is_refused_by_a_process_that_ends(name, tmp_path):
     """Arrow's filtering in threads never returned from the first; the second warned of a cast."""

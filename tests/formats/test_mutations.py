@@ -16,6 +16,7 @@ pytestmark = [pytest.mark.slow, needs(ROS), needs(SVG)]
 COUNT = 60
 
 
+@pytest.mark.sweep(kept=5)
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", MAKES)

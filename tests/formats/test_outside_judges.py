@@ -17,7 +17,7 @@ OLD_NAMES = pytest.mark.filterwarnings("ignore:.* deprecated:DeprecationWarning"
 """rapidchecker calls pyparsing by names that it warns of."""
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @OLD_NAMES
 @pytest.mark.parametrize("options", [ProgramOptions(), ProgramOptions(lift=0.0, lines=4)])
 def test_rapidchecker_parses_our_rapid(options):
@@ -29,7 +29,7 @@ def test_rapidchecker_parses_our_rapid(options):
     assert not check_format(text)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @OLD_NAMES
 def test_rapidchecker_parses_the_outputs_that_our_rapid_switches():
     from rapidchecker.check import check_format

@@ -68,7 +68,7 @@ def test_solutions_are_angles_within_half_a_turn():
     assert np.nanmin(found) > -np.pi
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("height", [100.0, 400.0])
 def test_reach_ends_where_a_search_no_longer_finds_the_pose(height):
     def exists(distance):

@@ -183,7 +183,7 @@ def test_out_of_reach_names_the_worst_sample_and_what_is_missing():
     assert np.isnan(found.joints).all()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_reach_agrees_with_a_search_near_the_boundary():
     rng = np.random.default_rng(8)
     agreed = {True: 0, False: 0}

@@ -9,7 +9,7 @@ from dmpcli.spatial import rotations
 from tests.extras_here import needs
 from tests.metrics.varied import strokes
 
-pytestmark = [needs(extras.FAST), pytest.mark.slow]
+pytestmark = [needs(extras.FAST), pytest.mark.thorough]
 
 
 def alike(found, wanted):

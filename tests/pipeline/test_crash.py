@@ -26,6 +26,7 @@ def traj(tmp_path_factory):
     return soak.stroke(tmp_path_factory.mktemp("stroke"))
 
 
+@pytest.mark.thorough
 def test_killed_at_random_no_more_than_a_second_is_lost(tmp_path, traj):
     recordings = [([*soak.RECORD, "--seed", str(i)], soak._LEADS) for i in range(3)]
     runs = [(["execute", str(traj), *soak.EXECUTE], 0.1)] * 2
@@ -45,6 +46,7 @@ def limited(size, *words):
     )
 
 
+@pytest.mark.thorough
 def test_a_full_disk_stops_the_recording_and_keeps_what_there_is(tmp_path):
     out = tmp_path / "demo.parquet"
     done = limited(24_000, "record", "-o", out, "--realtime", *PATIENT)
@@ -90,6 +92,7 @@ def test_where_only_the_file_finds_no_room_the_journal_is_whole(tmp_path, traj):
     assert "recovered" not in facts
 
 
+@pytest.mark.sweep(kept=4)
 @pytest.mark.parametrize(
     ("fault", "code", "words"),
     [

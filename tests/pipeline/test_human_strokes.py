@@ -28,11 +28,12 @@ def check_fit_generalize_report(run, folder, shape):
     assert stroke["goal_error"] < 0.005 * size
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_fit_generalize_report_through_pipes(dmpcli, tmp_path):
     check_fit_generalize_report(lambda *a, **k: dmpcli(*a, **k).stdout, tmp_path, PIPED)
 
 
+@pytest.mark.sweep(kept=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", shapes()[::2])
 def test_fit_generalize_report(in_process, tmp_path, shape):

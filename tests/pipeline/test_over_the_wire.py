@@ -19,7 +19,7 @@ from dmpcli.simulation.mock import PEN
 from tests.commands.virtual_lab import DMPCLI, Lab
 from tests.minimum_jerk import minimum_jerk
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.thorough
 
 START, GOAL = (-551.030, 131.399, -17.560), (-660.021, 130.034, -17.538)
 # Where the pen is parked: the plate lies 0.4 mm over the stroke, the pen 0.1 mm over the plate.

@@ -65,7 +65,7 @@ def test_the_pipe_of_the_readme(tmp_path):
     np.testing.assert_allclose(found.position()[0], [-700, 130, -17.5])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_bytes_through_every_stage(dmpcli, in_process, tmp_path):
     """Also in a process that did other things before."""
     for run, call in (("a", dmpcli), ("b", in_process)):
@@ -171,6 +171,7 @@ def test_every_command_refuses_what_is_no_input_in_a_line_or_two(
     assert [p.name for p in tmp_path.iterdir()] == ["input"]
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["fit demo -o -", "inspect demo", "record -o - --duration 2"])
 def test_a_full_or_closed_standard_output_is_one_line_and_a_lost_reader_is_sigpipe(
@@ -206,7 +207,7 @@ def test_a_skill_that_is_not_the_stroke_is_said_so_even_when_quiet(in_process):
     assert in_process("fit", REFERENCE, "-o", "s.json", "-q").stderr == ""
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_report_leaves_no_figures_of_an_older_one(in_process, tmp_path):
     in_process("fit", REFERENCE, "-o", "s.json")
     in_process("generalize", "s.json", "-o", "1.parquet", "--reproduce")

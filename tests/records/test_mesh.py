@@ -428,7 +428,7 @@ def test_the_order_of_vertices_and_faces_does_not_change_the_surface(order, seed
     assert_sound(found)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.tuples(*[st.integers(0, 26)] * 3), min_size=1, max_size=14))
 def test_triangles_thrown_on_a_lattice_become_sound_or_are_refused(faces):
@@ -446,7 +446,7 @@ def test_triangles_thrown_on_a_lattice_become_sound_or_are_refused(faces):
     assert parts.max() < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_no_file_whatever_it_holds_ends_the_process():
     """Damaged files of every format, in a process of their own: a crash would be a signal."""
     script = """

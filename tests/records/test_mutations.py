@@ -21,6 +21,7 @@ def test_there_are_as_many_readers_as_the_files_that_are_read():
     assert len(MAKES) >= 20
 
 
+@pytest.mark.sweep(kept=10)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MAKES)
 def test_whatever_is_done_to_an_input_it_is_read_or_refused_by_name(name):

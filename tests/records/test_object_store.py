@@ -102,6 +102,7 @@ def test_what_is_removed_is_gone_and_replaced_is_as_the_last_one_wrote_it(store)
     assert store.objects() == {}
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",

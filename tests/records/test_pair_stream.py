@@ -1,6 +1,7 @@
 """A table that is read in pieces says what it says when it is read whole."""
 
 import io
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -108,3 +109,74 @@ def test_quoted_cells_and_old_line_ends_are_read_whole(tmp_path):
 def test_short_tables_are_read_whole(tmp_path, monkeypatch):
     monkeypatch.setattr(pair_stream, "STREAMED", 1000)
     assert pair_stream.opened(write(tmp_path / "p.csv", lines_of(3))) is None
+
+
+def share_of(path, size, index, count):
+    share = pair_stream.Share(size, lambda part: part % count == index)
+    return replace(pair_stream.opened(path), share=share)
+
+
+def same_share(path, rows, size, index, count):
+    whole = pairs.read(file_io.read(path))
+    ours = [row for row in range(len(whole)) if row // size % count == index]
+    pieces = list(share_of(path, size, index, count).pieces(rows))
+    assert [len(one) for one in pieces[:-1]] == [rows] * (len(pieces) - 1)
+    assert [row for one in pieces for row in one.numbers.tolist()] == ours
+    assert list(chain(*(one.ids for one in pieces))) == [whole.ids[row] for row in ours]
+    assert list(chain(*(one.status for one in pieces))) == [whole.status[row] for row in ours]
+    start = np.concatenate([np.empty((0, 3)), *(one.pairs.start for one in pieces)])
+    np.testing.assert_array_equal(start, whole.pairs.start[ours])
+    places = [one.place(i) for one in pieces for i in range(len(one))]
+    assert places == [whole.place(row) for row in ours]
+
+
+def with_odd_lines(lines):
+    found = []
+    for i, line in enumerate(lines):
+        found += [["# a comment", "", "  ", "k,1,nan,3,4,5,6,,"][i % 4]] if i % 3 == 0 else []
+        found.append(line)
+    return [line.replace("k,", f"odd{i},") for i, line in enumerate(found)]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize(("size", "count"), [(1, 2), (2, 3), (3, 2), (5, 4), (30, 2)])
+def test_a_share_of_a_text_is_its_rows_of_the_whole(tmp_path, end, size, count):
+    path = write(tmp_path / "p.csv", with_odd_lines(lines_of(20)), end)
+    for index in range(count):
+        same_share(path, 2 * size, size, index, count)
+
+
+@pytest.mark.parametrize("group", [1, 3, 4, 7, 100])
+@pytest.mark.parametrize(("size", "count"), [(1, 2), (2, 3), (3, 2), (30, 2)])
+def test_a_share_of_parquet_is_its_rows_whatever_its_row_groups(tmp_path, group, size, count):
+    table = pa.csv.read_csv(io.BytesIO("\n".join([HEADER, *lines_of(23)]).encode()))
+    pq.write_table(table.drop_columns(["id"]), tmp_path / "p.parquet", row_group_size=group)
+    for index in range(count):
+        same_share(tmp_path / "p.parquet", 2 * size, size, index, count)
+
+
+def test_row_groups_without_a_row_of_the_share_are_not_read(tmp_path):
+    path = tmp_path / "p.parquet"
+    table = pa.csv.read_csv(io.BytesIO("\n".join([HEADER, *lines_of(12)]).encode()))
+    pq.write_table(table, path, row_group_size=4, write_page_checksum=True)
+    column = pq.read_metadata(path).row_group(1).column(1)
+    content = bytearray(path.read_bytes())
+    begin = column.dictionary_page_offset or column.data_page_offset
+    for i in range(begin, begin + column.total_compressed_size):
+        content[i] ^= 0xFF
+    path.write_bytes(content)
+    with pytest.raises(InputError):
+        list(pair_stream.opened(path).pieces(4))
+    rows = [one.numbers.tolist() for one in share_of(path, 4, 0, 2).pieces(4)]
+    assert rows == [[0, 1, 2, 3], [8, 9, 10, 11]]
+
+
+def test_lines_of_others_are_counted_not_parted_and_messages_name_the_files_lines(tmp_path):
+    lines = lines_of(12)
+    lines[6] += ",1"
+    path = write(tmp_path / "p.csv", ["# a comment", *lines])
+    assert [len(one) for one in share_of(path, 2, 0, 2).pieces(2)] == [2, 2, 2]
+    lines[9] += ",1"
+    path = write(tmp_path / "p.csv", ["# a comment", *lines])
+    with pytest.raises(InputError, match="line 12 has 10 columns"):
+        list(share_of(path, 2, 0, 4).pieces(2))

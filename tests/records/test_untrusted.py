@@ -111,7 +111,7 @@ def test_a_dictionary_cannot_blow_its_text_up():
         tables.read(Source("a.parquet", content))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_table_of_many_columns_is_refused_at_once():
     header = ",".join(f"c{i}" for i in range(100_000))
     begin = time.monotonic()

@@ -169,7 +169,7 @@ def test_on_a_plane_that_is_given(tmp_path):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("end", [{"closed": True}, {"end_heights": [3.0, 0.5]}, {}, {"band": 1}])
 def test_kernels_measure_strokes_of_all_kinds_as_each_is_measured(tmp_path, end):
     normal = np.array([0.0, 0.1, 1.0]) / np.linalg.norm([0.0, 0.1, 1.0])
@@ -190,7 +190,7 @@ def test_kernels_measure_strokes_of_all_kinds_as_each_is_measured(tmp_path, end)
     alike_by_kernels(folder, None, plane, normal)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_on_a_mesh(tmp_path):
     mesh = Mesh(*fillet_mesh())
     made = []

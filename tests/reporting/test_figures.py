@@ -56,7 +56,7 @@ def files(strokes):
     return figures.gallery(strokes)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_papers_inputs_give_figures_4_to_8_twice_with_the_same_bytes(strokes, files):
     names = {name.rsplit(".", 1)[0] for name in files}
     assert names == {

@@ -27,12 +27,13 @@ def ours(tmp_path):
     return tmp_path / f"dmpcli-matplotlib-{os.getuid()}"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_home_that_can_be_written_is_left_to_matplotlib(tmp_path):
     assert drawn(tmp_path) == ("", "")
 
 
 # A file where the home should be, and no folder at all: both stop root, too.
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("home", ["file", pytest.param("/dev/null/home", marks=pytest.mark.slow)])
 def test_a_home_that_cannot_be_written_has_one_folder_for_each_user_instead(tmp_path, ours, home):
@@ -44,7 +45,7 @@ def test_a_home_that_cannot_be_written_has_one_folder_for_each_user_instead(tmp_
     assert any(ours.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_folder_that_others_can_write_is_not_believed(tmp_path, ours):
     ours.mkdir()
     ours.chmod(0o777)
@@ -53,7 +54,7 @@ def test_a_folder_that_others_can_write_is_not_believed(tmp_path, ours):
     assert not any(ours.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_what_the_user_chose_stands(tmp_path):
     chosen = str(tmp_path / "chosen")
     assert drawn(tmp_path, HOME="/dev/null/home", MPLCONFIGDIR=chosen) == ("", chosen)

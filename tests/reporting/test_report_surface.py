@@ -79,6 +79,7 @@ def bumpy():
     return cases.mesh("bumpy", 8_000)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [saddle, bumpy, scan])
 def test_wave_heights_are_those_of_exact_geodesics(make):

@@ -127,7 +127,7 @@ def test_strokes_beside_the_mesh_say_why_they_have_no_wave_height(ground):
     assert "leaves the mesh" in footing.remark
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_strokes_are_measured_together_as_each_alone(ground):
     many = [modified(30.0), original(), modified(49.98)]
     short = modified(49.98)
@@ -174,7 +174,7 @@ def strokes(ground):
     return placed([reference, modified(), original()], ground, reference)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_figure_9_is_drawn_the_same_twice(strokes, ground):
     files = figures.gallery(strokes, ground)
     assert {"fig9_surface.svg", "fig9_surface.png"} <= set(files)

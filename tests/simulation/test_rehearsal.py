@@ -23,6 +23,7 @@ def deviation(stroke, p):
     return cKDTree(stroke.at(np.linspace(0.0, 10.0, 20001), 10.0)).query(p)[0]
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_the_papers_stroke_is_drawn_at_its_wave_height(seed):
@@ -55,7 +56,7 @@ def rougher(measure, t, one, other):
     return values[0] < values[1] - 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_built_in_drag_is_further_off_and_rougher_for_the_same_hand():
     for seed in range(3):
         stroke, ours, _ = rehearse(seed=seed)

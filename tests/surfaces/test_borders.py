@@ -63,6 +63,7 @@ def unrolled_strokes(count, cells, samples=300, seed=5):
     return start, goal, L, coordinates, sheet
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("cells", [40, 120])
 def test_strokes_off_a_patch_with_a_hole_are_told_from_those_on_it(cells):

@@ -82,6 +82,7 @@ def test_standing_still_is_no_harm():
     assert np.isfinite(frame_smoothing.smoothed(axes, position)).all()
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("noise", [0.0, 0.01])

@@ -67,6 +67,7 @@ def test_what_an_exact_chart_drew_is_found_again(name, height):
     assert_found(charts, swung(charts, 20.0, height))
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["saddle", "bumpy"])
 @pytest.mark.parametrize("height", [0.0, 0.3, HEIGHT, -HEIGHT])
@@ -174,6 +175,7 @@ def test_beyond_the_centre_of_curvature_feet_are_not_told_apart():
     assert not invert(charts, axis[None]).reached.any()
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["saddle", "bumpy"])
 def test_feet_are_those_of_the_true_surface_up_to_the_mesh(name):

@@ -13,7 +13,7 @@ from tests.surfaces.judge import Judge, traced
 from tests.surfaces.test_borders import patch_with_hole, roll, unrolled_strokes
 from tests.surfaces.test_slits import plate_with_fin
 
-pytestmark = [needs(extras.FAST), pytest.mark.slow]
+pytestmark = [needs(extras.FAST), pytest.mark.thorough]
 
 # Of positions, mm, and axes, rad: what rounding comes to.
 ALIKE = 1e-11
@@ -109,10 +109,7 @@ def test_closest_points_are_those_of_the_library_from_everywhere():
         near = mesh.corners.mean(axis=1)[rng.integers(0, len(mesh.F), 500)]
         points = np.concatenate([points, near + rng.normal(0.0, 0.05, (500, 3))])
         foot, _ = mesh.search(points)
-        nodes, offs = tree.stack()
-        near = [tree.closest(mesh.facets, tuple(p), nodes, offs) for p in points]
-        found = np.array([point for point, _ in near])
-        face = mesh.facets.numbers[[row for _, row in near], tree.FACE]
+        found, face, _ = tree.search(mesh.facets, points)
         off = [np.linalg.norm(points - one, axis=1) for one in (foot, found)]
         np.testing.assert_allclose(off[1], off[0], atol=1e-12)
         corners = mesh.corners[face]

@@ -63,6 +63,7 @@ def test_what_a_patch_says_is_what_the_mesh_says(name, monkeypatch):
     assert cut >= 4  # patches, not the whole mesh
 
 
+@pytest.mark.sweep(kept=4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", zoo.PARTS)
 def test_so_it_is_on_parts_with_creases_fillets_and_bores(name, monkeypatch):

@@ -21,6 +21,7 @@ def deviation(name, faces, headings=12, periods=2):
     return mesh, case, charts, lift, np.linalg.norm(lift.position - case.position, axis=-1)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("periods", [1, 2])
 @pytest.mark.parametrize("name", cases.SURFACES)
@@ -37,6 +38,7 @@ def test_strokes_follow_the_true_strip_as_well_as_the_mesh_allows(name, periods)
     assert np.degrees(np.arccos((skew.min() - 1) / 2)) < 2.0
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 def test_deviation_shrinks_with_the_square_of_the_edge_length(name):
@@ -122,6 +124,7 @@ def test_a_planar_mesh_is_the_plane():
     np.testing.assert_allclose(b.lift(around).position, a.lift(around).position, atol=1e-6)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", [20.0, 30.0, 60.0, 90.0])
 @pytest.mark.parametrize("cells", [1, 12])
@@ -239,6 +242,7 @@ def noisy(mesh, sigma):
     return Mesh(mesh.V + sigma * rng.normal(size=mesh.V.shape), mesh.F)
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", cases.SURFACES)
 @pytest.mark.parametrize("sigma", [0.05, 0.1])
@@ -259,6 +263,7 @@ def test_strokes_over_a_noisy_scan_keep_their_place_and_turn_gently(name, sigma)
     assert cases.turns(lift.axes).max() < cases.turns(case.axes).max() + 3.0
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", [10.0, 25.0, 60.0])
 def test_folds_of_a_noisy_scan_are_drawn_well_or_refused(degrees):

@@ -95,7 +95,7 @@ def test_touched_points_give_back_rigid_motions_exactly(seed, kind):
     assert found.residual.max() < 1e-6
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_noise_averages_out_as_the_uncertainty_says():
     rng = np.random.default_rng(6)
     V, F = BUMPY
@@ -145,6 +145,7 @@ def ball():
     return np.array(made.vertices, dtype=float), np.array(made.faces)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("mesh", "free"),
@@ -196,6 +197,7 @@ def test_six_touched_points_are_too_few():
         laid(V[:6], V, F, np.eye(3), np.zeros(3))
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count", "least"),
@@ -211,7 +213,7 @@ def test_accepted_poses_are_right_and_within_their_bound(name, count, least):
     assert len(good) >= least * len(found)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_in_all_orientations_the_pose_is_found_without_a_start():
     V, F, part = loaded("bracket")
     found = [trial(V, F, part, 24, seed, anywhere=True) for seed in range(2)]

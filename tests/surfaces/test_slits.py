@@ -29,6 +29,7 @@ def straight(mesh, start, goal, side):
     return charts.lift(coordinates)
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -0.9, 1.3)])
 @pytest.mark.parametrize(("first", "last"), [(2, 3), (2, 6), (0, 4)])

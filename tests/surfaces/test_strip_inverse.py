@@ -11,6 +11,7 @@ from dmpcli.surfaces import strip_inverse, strip_pieces
 from dmpcli.surfaces.inverse_chart import _by_steps, invert, on_strips
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.strip_grid import Grid
+from dmpcli.surfaces.strip_settling import Course
 from tests.extras_here import needs
 from tests.surfaces import cases, zoo
 from tests.surfaces.judge import Judge, traced
@@ -87,7 +88,7 @@ def test_positions_far_off_the_mesh_are_left_to_the_search(bumpy):
     np.testing.assert_allclose(invert(charts, drawn.position).coordinates, wanted, atol=2e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_feet_on_edges_are_led_to_as_near_as_the_smooth_course_lies_to_the_facets(ball):
     charts = laid(ball, headings=2, half=40.0, top=95.0)
     drawn = charts.lift(wave(charts, wide=12.0)).position
@@ -123,7 +124,7 @@ def test_a_strip_has_the_nodes_of_all_eight_cells_around_that_of_a_sample(monkey
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("height", [0.0, 0.3, -0.3])
 @pytest.mark.parametrize("wide", [0.0, 4.0, 25.0])
 def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
@@ -143,7 +144,7 @@ def test_kernels_find_what_the_chart_drew(bumpy, ball, height, wide):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_kernels_find_a_stroke_alike_alone_and_among_others(bumpy):
     charts = laid(bumpy.with_kernels)
     position = charts.lift(wave(charts)).position
@@ -155,7 +156,7 @@ def test_kernels_find_a_stroke_alike_alone_and_among_others(bumpy):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["drilled", "ribbed", "cone", "filleted"])
 def test_kernels_tell_alike_what_has_no_place_on_parts_with_edges(name):
     mesh = zoo.mesh(name)
@@ -177,7 +178,42 @@ def test_kernels_tell_alike_what_has_no_place_on_parts_with_edges(name):
 
 
 @needs(extras.FAST)
-@pytest.mark.slow
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["bumpy", "ribbed", "united"])
+@pytest.mark.parametrize("other", [None, 3, 0], ids=["one course", "one strays", "none"])
+def test_a_course_in_common_tells_nothing_else_than_each_stroke_does(name, other):
+    if name == "bumpy":
+        pure = laid(cases.mesh("bumpy", 8_000), headings=12)
+        kernels = laid(cases.mesh("bumpy", 8_000).with_kernels, headings=12)
+    else:
+        mesh = zoo.mesh(name)
+        pairs = traced(Judge(mesh), 12, np.random.default_rng(9))
+        pure, kernels = (m.charts(pairs.start, pairs.goal) for m in (mesh, mesh.with_kernels))
+    wanted = wave(pure, wide=3.0)
+    if other is not None:
+        wanted[other, :, 1] *= 1.5
+    drawn = pure.lift(wanted).position
+    position = np.where(np.isfinite(drawn), drawn, 0.0)
+    course = Course()
+    found, each = (
+        strip_inverse.found(kernels, position, course),
+        strip_inverse.found(kernels, position),
+    )
+    np.testing.assert_array_equal(found.rows, each.rows)
+    np.testing.assert_allclose(found.coordinates, each.coordinates, atol=1e-9)
+    np.testing.assert_allclose(found.axes, each.axes, atol=1e-9)
+    np.testing.assert_array_equal(found.rows, strip_inverse.found(pure, position).rows)
+    assert course.told
+    if name == "bumpy":
+        assert (course.place is None) == (other == 0)
+    # Strokes that are measured later take what was told.
+    again = strip_inverse.found(kernels, position, course)
+    np.testing.assert_array_equal(again.rows, each.rows)
+    np.testing.assert_allclose(again.coordinates, each.coordinates, atol=1e-9)
+
+
+@needs(extras.FAST)
+@pytest.mark.thorough
 def test_kernels_find_the_closest_points_of_paths(bumpy):
     rng = np.random.default_rng(2)
     charts = laid(bumpy)

@@ -13,6 +13,7 @@ def made():
     return meshes, error, {name: cases.case(name, HEADINGS, SAMPLES, 1) for name in meshes}
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["saddle", "bumpy", "cylinder"])
 def test_a_stroke_is_carried_from_any_curved_part_to_any(made, name):

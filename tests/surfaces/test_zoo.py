@@ -46,6 +46,6 @@ def test_no_part_is_taken_for_a_noisy_scan(name):
     assert zoo.mesh(name).shape.noisy_share <= 0.001
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_strokes_on_parts_are_drawn_right_or_refused_for_what_the_tracer_meets_too():
     check([judged(name, 12, 2) for name in zoo.PARTS])

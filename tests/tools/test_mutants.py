@@ -158,7 +158,7 @@ WANTED = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_mutant_is_killed_by_the_test_that_is_named_and_survives_where_none_reaches(tmp_path):
     for folder in ("package/room", "tests/room"):
         (tmp_path / folder).mkdir(parents=True)

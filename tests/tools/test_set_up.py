@@ -160,7 +160,7 @@ def test_a_folder_that_holds_something_else_is_not_emptied(place):
     assert (place.venv / "thesis.tex").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_no_index_is_one_line(pip, monkeypatch):
     monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
     monkeypatch.setenv("PIP_FIND_LINKS", "")
@@ -184,7 +184,7 @@ def test_what_an_interrupted_one_left_is_made_whole_once_also_by_two_at_once(who
     assert whole.done() == ""
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_is_made_once_and_anew_when_lock_or_python_changes(whole):
     assert whole.done() == ""
     # An activated environment's Python is the environment's own: it must outlive its folder.

@@ -57,6 +57,7 @@ def test_a_recording_has_the_bytes_that_record_writes(tmp_path, taught):
     np.testing.assert_array_equal(named.position, taught.position)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),

@@ -5,12 +5,15 @@ from typing import NamedTuple
 from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.tree import (
+    FLAGS,
     PART,
     REACH,
+    SPLIT,
     Facets,
     beyond_border,
     closest,
     in_doubt,
+    nothing_else,
     smooth_normal,
     stack,
 )
@@ -76,12 +79,19 @@ def _probe(
     nodes: Halves,
     offs: Floats,
 ) -> tuple[Vector, bool, bool]:
-    """Normal at the closest point, whether the surface goes on there, and `in_doubt`."""
+    """Normal at the closest point, whether the surface goes on there, and `in_doubt`.
+
+    Far off the mesh too it is no matter which of the facets that meet at the closest point is
+    named, if nothing else is as near: their normals are one there.
+    """
     foot, row = closest(facets, p, nodes, offs)
     there = times(sign, smooth_normal(facets.reals, foot, row))
     good = dot(there, normal) > limits.sharp and facets.numbers[row, PART] == part
     good = good and not beyond_border(facets, p, foot, row, limits.on_border)
-    return there, good, in_doubt(facets, p, foot, row)
+    unsure = in_doubt(facets, p, foot, row)
+    if unsure and not facets.numbers[row, FLAGS] & SPLIT:
+        unsure = not nothing_else(facets, p, foot, nodes)
+    return there, good, unsure
 
 
 @kernel

@@ -9,14 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Halves, Singles
+from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
 
 _LEAF = 4
-_SPLIT = 64
+SPLIT = 64
 _ON = 1e-9
 """A foot this near to an edge of its facet may as well lie on the next one, mm."""
+_SAME = 1e-6
+"""Feet no farther apart than this are one place, mm."""
 _REACH = 0.29**2
 """Points nearer to the mesh than this, mm², are within reach of any of its facets."""
 _BALL = 0.2**2
@@ -318,13 +320,53 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
     at the same distance a search comes upon. Then numpy's way decides, so that both ways agree.
     """
     gap = sub(p, foot)
-    if not facets.numbers[row, FLAGS] & _SPLIT and dot(gap, gap) < _REACH:
+    if not facets.numbers[row, FLAGS] & SPLIT and dot(gap, gap) < _REACH:
         return False
     for k in range(3):
         beside = dot(outward_of(facets.reals, row, k), foot) - facets.reals[row, EDGES + 9 + k]
         if beside > -_ON:
             return True
     return False
+
+
+@kernel
+def nothing_else(facets: Facets, p: Vector, foot: Vector, nodes: Halves) -> bool:
+    """Tell whether nothing of the mesh but what meets at a foot is as near to a point."""
+    gap = sub(p, foot)
+    reach = length(gap) + _ON
+    bound, inner = reach * reach, len(facets.first) - 2
+    nodes[0], held = 0, 1
+    while held > 0:
+        held -= 1
+        node = nodes[held]
+        if _off_box(facets.boxes, node, p) > bound:
+            continue
+        if node < inner:
+            nodes[held], nodes[held + 1] = 2 * node + 1, 2 * node + 2
+            held += 2
+            continue
+        leaf = node - inner
+        for i in range(facets.first[leaf], facets.first[leaf + 1]):
+            if _lower(facets.reals, i, p) > bound:
+                continue
+            q = on_facet(facets.reals, i, p)
+            if length(sub(p, q)) <= reach and length(sub(q, foot)) > _SAME:
+                return False
+    return True
+
+
+@kernel
+def search(facets: Facets, points: Floats) -> tuple[Floats, Integers, Booleans]:
+    """Closest points (N, 3), mm, their faces (N,), and which are `in_doubt` (N,)."""
+    nodes, offs = stack()
+    feet, face = np.empty_like(points), np.empty(len(points), dtype=np.int64)
+    doubt = np.empty(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        p = points[i, 0], points[i, 1], points[i, 2]
+        foot, row = closest(facets, p, nodes, offs)
+        feet[i, 0], feet[i, 1], feet[i, 2] = foot
+        face[i], doubt[i] = facets.numbers[row, FACE], in_doubt(facets, p, foot, row)
+    return feet, face, doubt
 
 
 @kernel

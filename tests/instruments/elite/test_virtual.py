@@ -110,6 +110,7 @@ def test_a_plan_is_drawn_either_way(bench, kind, mode, newline):
     np.testing.assert_allclose(flange + turned @ PEN.tcp_position, actual, atol=1e-6)
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mode"), [(ServoLoop, "stream"), (Playback, "file")])
 @pytest.mark.parametrize(

@@ -213,7 +213,7 @@ def believable(letters):
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_of_a_hundred_thousand_fuzzed_datagrams_no_wrong_one_is_believed_and_every_fault_is_named():
     rng = np.random.default_rng(20240607)
     datagrams = healthy = faults = 0
