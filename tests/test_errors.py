@@ -1,11 +1,18 @@
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmpcli import errors
+from dmpcli.admittance.model import AdmittanceLaw, check_stable
 from dmpcli.errors import InputError, about, beside, printable
+from dmpcli.kinematics import chain, inverse, models
+from dmpcli.records import tolerance_mark
+from dmpcli.workflows.ranges import within
 
 
 @pytest.mark.parametrize(
@@ -56,3 +63,37 @@ def test_a_file_is_named_once_however_many_say_it():
         with pytest.raises(InputError) as told, about("a.csv"):
             raise InputError(said)
         assert str(told.value) == "a.csv: row 3: no value"
+
+
+def beyond_joint_limit():
+    arm = models.model("ec66")
+    narrow = replace(arm, limits=np.radians(np.tile([-57.3, 57.3], (6, 1))))
+    q = np.array([np.radians(57.3004), -0.9, 0.9, 0.5, -0.9, 0.7])
+    inverse.nearest(narrow, chain.forward(narrow, q), q)
+
+
+@pytest.mark.parametrize(
+    ("refuse", "told"),
+    [
+        (
+            lambda: within("--start", [0.0, -1000000.1], 1e6),
+            r"--start: -1000000\.1 is beyond 1e\+06",
+        ),
+        (lambda: within("--goal", [1000000.1], 1e6), r"--goal: 1000000\.1 is beyond"),
+        (
+            lambda: check_stable(
+                AdmittanceLaw(np.full(6, 0.01), np.full(6, 1.0000001), np.zeros(6), 0.02)
+            ),
+            r"= 0\.040000004 not below 4M = 0\.04 ",
+        ),
+        (beyond_joint_limit, r"would turn to 57\.3004°, beyond -57\.3° to 57\.3°"),
+    ],
+)
+def test_no_refusal_rounds_a_number_onto_its_bound(refuse, told):
+    with pytest.raises(errors.DmpError, match=told):
+        refuse()
+
+
+def test_a_skills_mark_names_two_lengths_that_differ():
+    said = tolerance_mark.text("a", {"rms": 0.02, "largest": 0.10004, "tolerance": 0.1})
+    assert "largest 0.10004 mm, beyond its tolerance of 0.1 mm" in said

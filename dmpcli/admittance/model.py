@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError
+from dmpcli.errors import InputError, beside
 from dmpcli.spatial.rotations import exp_one, log_one
 
 AXES = ("x", "y", "z", "rotation x", "rotation y", "rotation z")
@@ -110,7 +110,8 @@ def check_stable(law: AdmittanceLaw, names: tuple[str, ...] = AXES) -> None:
             raise InputError(f"admittance, {name}: stiffness = {K:g}: must be finite, 0 or more")
         if not 2.0 * T * D + T**2 * K < 4.0 * M:
             raise InputError(
-                f"admittance, {name}: unstable, 2TD + T²K = {2.0 * T * D + T**2 * K:g} not below "
+                f"admittance, {name}: unstable, 2TD + T²K = "
+                f"{beside(2.0 * T * D + T**2 * K, 4.0 * M, '.6g')} not below "
                 f"4M = {4.0 * M:g} at a period of {T:g} s; raise the mass or the control rate, "
                 "or lower damping and stiffness"
             )

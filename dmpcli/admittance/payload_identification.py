@@ -21,7 +21,7 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats
 from dmpcli.dmp.options import CONDITION
-from dmpcli.errors import RefusedError
+from dmpcli.errors import RefusedError, beside
 from dmpcli.spatial import wrench
 from dmpcli.spatial.rotations import log, skew
 from dmpcli.spatial.wrench import LEVER
@@ -150,8 +150,9 @@ def check_orientations(R: Floats, limit: float = CONDITION) -> None:
         axis = left[:, 0] * np.sign(left[np.argmax(np.abs(left[:, 0])), 0])
         words = ", ".join(f"{part + 0.0:.2f}" for part in np.round(axis, 2))
         about = f" (they turn about one axis, ({words}) of the base)"
+    said = beside(number, limit, ".3g")
     raise RefusedError(
-        f"the poses do not tell weight and zero apart: condition number {number:.3g} is over "
+        f"the poses do not tell weight and zero apart: condition number {said} is over "
         f"{limit:g}{about};\ntilt the tool further, in all directions: 12 poses that are tilted by "
         "45° have 2.4"
     )

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.errors import InputError, RefusedError, beside
 
 if TYPE_CHECKING:
     from dmpcli.arrays import Floats
@@ -144,9 +144,9 @@ def _residual(result: "Registration", points: "Touched", limit: float) -> str | 
     worst = int(np.argmax(result.residual))
     if result.residual[worst] <= limit:
         return None
-    table = points.table
+    table, off = points.table, beside(result.residual[worst], limit, ".3f")
     return (
-        f"{table.name}: {table.at(worst)}: lies {result.residual[worst]:.3f} mm off the part "
+        f"{table.name}: {table.at(worst)}: lies {off} mm off the part "
         f"(median of all {np.median(result.residual):.3f} mm), more than --max-residual "
         f"{limit:g};\ntouch it again, "
         + (

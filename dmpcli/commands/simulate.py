@@ -12,7 +12,7 @@ from dmpcli.commands.options import (
     SurfacePose,
     SurfaceUnit,
 )
-from dmpcli.errors import InputError
+from dmpcli.errors import InputError, beside
 from dmpcli.messages import on_terminal, tell, warn
 from dmpcli.settings.options import Only, with_options
 from dmpcli.settings.record import TUTOR, RecordSettings, check
@@ -67,9 +67,10 @@ def command(
 
     check(settings)
     if served.lookahead > LONGEST_LOOKAHEAD:
+        said = beside(served.lookahead, LONGEST_LOOKAHEAD, ".6g")
         warn(
-            f"--lookahead {served.lookahead:g}: above {LONGEST_LOOKAHEAD:g} s the drag swings to "
-            "and fro, however well the hand has practised"
+            f"--lookahead {said}: above {LONGEST_LOOKAHEAD:g} s the drag swings to and fro, "
+            "however well the hand has practised"
         )
     faults = fault_words.parse(served.fault)
     if drawn is not None:

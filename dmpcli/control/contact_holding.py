@@ -6,6 +6,7 @@ from dataclasses import replace
 from dmpcli.admittance.force_law import LawState, advance, by_rule
 from dmpcli.admittance.oscillation import AlternationDetector
 from dmpcli.control.contact_course import ContactCourse
+from dmpcli.errors import beside
 
 # How near the force must stay to its set-point, as a share of it, and for so long, s.
 NEAR, NEAR_TIME = 0.1, 0.1
@@ -142,7 +143,8 @@ class HeldForce(ContactCourse):
             self.fail(
                 t,
                 "too hard",
-                f"{force:.1f} N along the normal, over {most:.1f} N{k} behind "
+                f"{beside(force, most, '.1f')} N along the normal, over "
+                f"{beside(most, force, '.1f')} N{k} behind "
                 f"{self._known_delay:.2g} s: a wall, a ramp, or a surface that is stiffer than the "
                 "loop can follow",
                 urgent=True,

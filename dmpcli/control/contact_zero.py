@@ -4,6 +4,7 @@ import math
 
 from dmpcli.control.contact_course import REST, SURE, ContactCourse
 from dmpcli.control.guarded_motion import towards
+from dmpcli.errors import beside
 
 # A force that falls by so much over the last step of the lift is a contact, N, and so many standard
 # deviations of a cycle's noise.
@@ -75,11 +76,11 @@ class LiftedTool(ContactCourse):
 
     def zero_is(self, t: float, size: float) -> None:
         """Say how far the zero was off, N; too far is refused."""
-        if size > self.policy.zero_limit:
+        if size > (most := self.policy.zero_limit):
             self.fail(
                 t,
                 "free",
-                f"the lifted tool reads {size:.2f} N, over {self.policy.zero_limit:g} N "
+                f"the lifted tool reads {beside(size, most, '.2f')} N, over {most:g} N "
                 "(coupling_zero_limit): the tool file's zero or weight is another one's, or "
                 "something touches the tool; calibrate, and lift it clear",
             )

@@ -24,7 +24,7 @@ from dmpcli.control.cycle import (
 from dmpcli.control.demonstration_log import DemonstrationLog
 from dmpcli.control.force_sensing import Sensing
 from dmpcli.control.signals import Interruption
-from dmpcli.errors import DmpError, InputError
+from dmpcli.errors import DmpError, InputError, beside
 from dmpcli.instruments.protocols import (
     Clock,
     DragTeaching,
@@ -187,8 +187,9 @@ class Recorder(ControlLoop):
             if self._shared and self._streams:
                 ownership.require_rest(self._robot, self._clock)
             if self._streams and servo.lookahead > LONGEST_LOOKAHEAD:
+                ahead = beside(servo.lookahead, LONGEST_LOOKAHEAD, ".6g")
                 self._remark(
-                    f"robot: lags by its look-ahead of {servo.lookahead:g} s, and above "
+                    f"robot: lags by its look-ahead of {ahead} s, and above "
                     f"{LONGEST_LOOKAHEAD:g} s the drag swings to and fro; shorten lookahead"
                 )
             self._sensor.start(self._settings.sensor_rate)

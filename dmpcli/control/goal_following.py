@@ -13,7 +13,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.dmp.goal_step import GoalFilter
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.errors import InputError, RefusedError, beside
 from dmpcli.instruments.goal_sources import BACK, GoalNews, GoalSource
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
@@ -201,7 +201,8 @@ class GoalFollower:
                 now,
                 wanted,
                 "too far",
-                f"{distance:.1f} mm from the planned goal, over {options.range:g} (goal_range)",
+                f"{beside(distance, options.range, '.1f')} mm from the planned goal, over "
+                f"{options.range:g} (goal_range)",
             )
             return
         wait = 0

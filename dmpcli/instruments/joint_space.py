@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import RefusedError
+from dmpcli.errors import RefusedError, beside
 from dmpcli.instruments import pose_forms
 from dmpcli.instruments.driver_protocol import DriverInfo, Orientation
 from dmpcli.kinematics import chain, inverse
@@ -105,10 +105,10 @@ class JointSpace:
         speed = np.abs(joints - before) / period
         if not (speed <= (1.0 + _SLACK) * self._arm.speeds).all():
             worst = int(np.argmax(speed / self._arm.speeds))
+            needed, most = np.degrees(speed[worst]), np.degrees(self._arm.speeds[worst])
             raise RefusedError(
-                f"joint {worst + 1} would have to turn at {np.degrees(speed[worst]):.0f}°/s, over "
-                f"its {np.degrees(self._arm.speeds[worst]):.0f}°/s: too fast, or too near a "
-                "singularity"
+                f"joint {worst + 1} would have to turn at {beside(needed, most, '.0f')}°/s, over "
+                f"its {beside(most, needed, '.0f')}°/s: too fast, or too near a singularity"
             )
         return joints
 

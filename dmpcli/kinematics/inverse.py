@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.errors import InputError, RefusedError
+from dmpcli.errors import InputError, RefusedError, beside
 from dmpcli.kinematics.models import Arm
 from dmpcli.spatial.pose import Pose
 
@@ -194,8 +194,10 @@ def nearest(arm: Arm, flange: Pose, reference: Floats) -> Floats:
     best = [b + step for b, step in zip(before, steps, strict=True)]
     for joint, (angle, (low, high)) in enumerate(zip(best, arm.limits.tolist(), strict=True), 1):
         if not low - _SLACK <= angle <= high + _SLACK:
+            end = math.degrees(low if angle < low else high)
             raise RefusedError(
-                f"joint limit: joint {joint} would turn to {math.degrees(angle):.2f}°, beyond "
+                f"joint limit: joint {joint} would turn to "
+                f"{beside(math.degrees(angle), end, '.2f')}°, beyond "
                 f"{math.degrees(low):g}° to {math.degrees(high):g}°"
             )
     return np.array(best)

@@ -217,4 +217,7 @@ def _missed(name: str, unit: str, peak: Peak) -> str:
     if unit == "mm":
         return f"{value:.3g} mm {name}"
     value, limit = float(np.degrees(value)), float(np.degrees(limit))
-    return f"{value:.4g} {unit} {name} {int(peak.joint[0]) + 1}, over {limit:.4g} {unit}"
+    said = beside(value, limit, ".4g")
+    return (
+        f"{said} {unit} {name} {int(peak.joint[0]) + 1}, over {beside(limit, value, '.4g')} {unit}"
+    )

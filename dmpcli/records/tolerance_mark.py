@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from dmpcli.errors import beside
+
 if TYPE_CHECKING:
     from dmpcli.dmp.skill import Accuracy
     from dmpcli.records.skill import Reached, SkillFile
@@ -30,8 +32,10 @@ def of_facts(facts: Mapping[str, Any]) -> dict[str, float] | None:
 
 def text(name: str, mark: Mapping[str, float]) -> str:
     """Say it in one line, with the remedy."""
+    largest, tolerance = mark["largest"], mark["tolerance"]
     return (
         f"{name}: the skill strays from what was demonstrated by RMS {mark['rms']:.3g} mm, largest "
-        f"{mark['largest']:.3g} mm, beyond its tolerance of {mark['tolerance']:.3g} mm; fit it "
+        f"{beside(largest, tolerance, '.3g')} mm, beyond its tolerance of "
+        f"{beside(tolerance, largest, '.3g')} mm; fit it "
         "again with --regression ridge, or a --tolerance that will do"
     )

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar, cast
 
-from dmpcli.errors import DmpError, InputError
+from dmpcli.errors import DmpError, InputError, beside
 from dmpcli.records.file_io import Source
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -88,8 +88,9 @@ def judge_size(name: str, size: int, largest: int, what: str) -> None:
     InputError
     """
     if size > largest:
+        has = beside(size / MIB, largest / MIB, ".3g")
         raise InputError(
-            f"{name}: has {size / MIB:.3g} MiB, more than the {largest / MIB:.3g} MiB that are "
+            f"{name}: has {has} MiB, more than the {largest / MIB:g} MiB that are "
             f"read of {what}; it is damaged, or not what it says"
         )
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dmpcli.errors import InputError, counted
+from dmpcli.errors import InputError, beside, counted
 from dmpcli.messages import tell, warn
 from dmpcli.spatial import output_events
 
@@ -230,9 +230,10 @@ def _regions(
         hits = surface.closest(line)
         farthest, most = int(hits.distance.argmax()), max(_OFF, settings.snap_tol)
         if hits.distance[farthest] > most:
+            off = beside(hits.distance[farthest], most, ".3f")
             raise InputError(
-                f"{name}: its point {farthest + 1} lies {hits.distance[farthest]:.3f} mm off the "
-                f"surface, more than {most:g}; the points are in base axes and mm"
+                f"{name}: its point {farthest + 1} lies {off} mm off the surface, more than "
+                f"{most:g}; the points are in base axes and mm"
             )
         try:
             found.append(enclosed(surface, hits.position))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from dmpcli.errors import InputError
+from dmpcli.errors import InputError, beside
 
 
 def within(option: str, values: Sequence[float], largest: float) -> None:
@@ -18,4 +18,5 @@ def within(option: str, values: Sequence[float], largest: float) -> None:
         if not math.isfinite(value):
             raise InputError(f"{option}: {value} is not a finite number")
         if abs(value) > largest:
-            raise InputError(f"{option}: {value:g} is beyond {largest:g}; check its unit")
+            said = beside(value, math.copysign(largest, value), ".6g")
+            raise InputError(f"{option}: {said} is beyond {largest:g}; check its unit")

@@ -162,15 +162,27 @@ class TrajectoryBatch(Trajectory):
     ids: list[str] = field(default_factory=list)
     ready: Ready | None = field(default=None, repr=False, compare=False)
     folder: Location | None = field(default=None, repr=False, compare=False)
-    as_drawn: Floats | None = field(default=None, repr=False, compare=False)
+    as_drawn: tuple[Floats | None, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.as_drawn is None:
-            object.__setattr__(self, "as_drawn", self.position)
-        # A batch is written, reported and executed as it was drawn.
-        for part in (self.t, self.position, self.rotation, self.normal):
+        if not self.as_drawn:
+            object.__setattr__(self, "as_drawn", self._arrays)
+        self._keep()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Of a deep copy, and of one from another process: their arrays are new, and can be written.
+        self.__dict__.update(state)
+        self._keep()
+
+    def _keep(self) -> None:
+        """Let nobody write where a batch is written, reported and executed as it was drawn."""
+        for part in self._arrays:
             if part is not None:
                 part.flags.writeable = False
+
+    @property
+    def _arrays(self) -> tuple[Floats | None, ...]:
+        return self.t, self.position, self.rotation, self.normal
 
     def check(self) -> None:
         """Refuse to take what was drawn for arrays that are others.
@@ -179,7 +191,8 @@ class TrajectoryBatch(Trajectory):
         ------
         InputError
         """
-        if self.position is not self.as_drawn:
+        pairs = zip(self._arrays, self.as_drawn, strict=True)
+        if any(one is not drawn for one, drawn in pairs):
             raise InputError(
                 "the batch's arrays were changed, and it would be taken as it was drawn; make "
                 "trajectories of them one by one"

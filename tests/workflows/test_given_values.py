@@ -203,3 +203,20 @@ def test_a_batch_is_taken_as_it_was_drawn_or_refused(skill, tmp_path):
             take()
     assert not (tmp_path / "b").exists()
     np.testing.assert_allclose(moved[0].position, many[0].position + 5.0)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_of_a_batch_is_taken_as_it_was_drawn_and_cannot_be_edited(skill, tmp_path, copied):
+    many = copied(dmpcli.generalize(skill, HERE, np.array([THERE, (0.0, 90.0, 0.0)])))
+    with pytest.raises(ValueError, match="read-only"):
+        many.position[0] += 5.0
+    dmpcli.write(many, tmp_path / "b")
+    again = dmpcli.read(tmp_path / "b")
+    np.testing.assert_allclose(again[1].position, many[1].position)
+
+
+@pytest.mark.parametrize("name", ["t", "position"])
+def test_a_batch_of_which_any_array_is_another_is_refused(skill, name):
+    many = dmpcli.generalize(skill, HERE, np.array([THERE, (0.0, 90.0, 0.0)]))
+    with pytest.raises(dmpcli.InputError, match="arrays were changed"):
+        dmpcli.report(dataclasses.replace(many, **{name: getattr(many, name) + 1.0}))
