@@ -93,7 +93,7 @@ def files() -> str:
             row = (f"`{name}`", column.unit, column.type, needed, column.meaning)
             lines.append(f"| {' | '.join(row)} |")
         lines.append("")
-    for name in json_schema.SCHEMAS:
+    for name in json_schema.FILES:
         lines += _json_file(name)
     return "\n".join(lines)
 

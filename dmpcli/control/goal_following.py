@@ -17,7 +17,7 @@ from dmpcli.errors import InputError, RefusedError, beside
 from dmpcli.instruments.goal_sources import BACK, GoalNews, GoalSource
 from dmpcli.kinematics.reachability import Reach
 from dmpcli.planning import goal_course
-from dmpcli.planning.goal_course import Course
+from dmpcli.planning.goal_course import GoalCourse
 from dmpcli.planning.limits import Limits
 from dmpcli.planning.plan import Plan
 from dmpcli.spatial.trajectory import StrokeTrajectory
@@ -91,7 +91,7 @@ class GoalFollower:
 
     Attributes
     ----------
-    course : Course
+    course : GoalCourse
         In force.
     taken : list of GoalEvent
     told : list of GoalEvent
@@ -124,7 +124,7 @@ class GoalFollower:
         self._refused: Counter[str] = Counter()
         self._wanted: Floats | None = None
         self._proposed = plan.position[plan.last]
-        self._judged: Iterator[str | Course] | None = None
+        self._judged: Iterator[str | GoalCourse] | None = None
 
     def begin(self, joints: Floats | None) -> None:
         """Say what the joints are before the first set-point, shape (6,), rad."""

@@ -34,7 +34,7 @@ _SAME = 1e-3  # rad
 
 
 @dataclass(frozen=True)
-class Course:
+class GoalCourse:
     """A plan with what its moved goal adds to it.
 
     Attributes
@@ -64,25 +64,27 @@ class Course:
         return there
 
 
-def first(plan: Plan, joints: Floats | None = None) -> Course:
+def first(plan: Plan, joints: Floats | None = None) -> GoalCourse:
     """Return the course of a plan whose goal has not moved."""
-    return Course(plan, np.zeros(3), np.zeros((len(plan), 2, 3)), joints)
+    return GoalCourse(plan, np.zeros(3), np.zeros((len(plan), 2, 3)), joints)
 
 
-def slices(now: Course, index: float, filter_: GoalFilter) -> int:
+def slices(now: GoalCourse, index: float, filter_: GoalFilter) -> int:
     """Cycles that judging the joints of a new course may take, from this set-point on."""
     more = np.log(1e3 / SETTLED) * 2.0 * filter_.slowest / filter_.period
     return 1 + int((len(now.plan) - index + more) // SLICE)
 
 
-def moved(base: Plan, now: Course, filter_: GoalFilter, shift: Floats, start: int) -> Course | None:
+def moved(
+    base: Plan, now: GoalCourse, filter_: GoalFilter, shift: Floats, start: int
+) -> GoalCourse | None:
     """Make the course to a goal, not yet judged.
 
     Parameters
     ----------
     base : Plan
         To the goal as it was planned.
-    now : Course
+    now : GoalCourse
         In force.
     filter_ : GoalFilter
     shift : array, shape (3,)
@@ -92,7 +94,7 @@ def moved(base: Plan, now: Course, filter_: GoalFilter, shift: Floats, start: in
 
     Returns
     -------
-    Course or None
+    GoalCourse or None
         None where the stroke would be drawn out for too long.
     """
     last, state = base.last, now.states[start]
@@ -108,7 +110,7 @@ def moved(base: Plan, now: Course, filter_: GoalFilter, shift: Floats, start: in
     plan = _drawn_out(base, end - last)
     position = plan.position + states[:, 0]
     position[: start + 1] = now.plan.position[: start + 1]
-    return Course(replace(plan, position=position), shift, states, None, start)
+    return GoalCourse(replace(plan, position=position), shift, states, None, start)
 
 
 def _drawn_out(base: Plan, more: int) -> Plan:
@@ -135,15 +137,15 @@ def _drawn_out(base: Plan, more: int) -> Plan:
 
 
 def judged(
-    course: Course, before: Course, limits: Limits, reach: Reach | None
-) -> Iterator[str | Course]:
+    course: GoalCourse, before: GoalCourse, limits: Limits, reach: Reach | None
+) -> Iterator[str | GoalCourse]:
     """Judge what is new of a course, a slice of its joints at a time.
 
     Parameters
     ----------
-    course : Course
+    course : GoalCourse
         Of `moved`.
-    before : Course
+    before : GoalCourse
         The one in force when it was made.
     limits : Limits
     reach : Reach or None
@@ -151,7 +153,7 @@ def judged(
 
     Yields
     ------
-    str or Course
+    str or GoalCourse
         Empty while there is more to judge; why it must not be drawn; or last, the course with its
         joints.
     """

@@ -69,8 +69,3 @@ def decode(source: Source) -> Manifest:
         Not JSON, another schema, a newer version, or a field that is missing or wrong; by name.
     """
     return json_files.validated(source, Manifest, SCHEMA, VERSION, "draw the batch again")
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of manifests."""
-    return json_files.json_schema(Manifest, SCHEMA)

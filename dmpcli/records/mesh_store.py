@@ -20,6 +20,7 @@ import scipy
 
 from dmpcli.arrays import AnyArray, Integers
 from dmpcli.records import file_io, surface
+from dmpcli.records.exact_surface import Exact
 from dmpcli.records.file_io import Source
 from dmpcli.records.mesh import MeshFile
 from dmpcli.spatial.pose import Pose
@@ -63,7 +64,7 @@ class MeshStore:
 
     def load(
         self, source: Source, unit: str | None = None, pose: Pose | None = None
-    ) -> surface.Exact | tuple[MeshFile, Mesh]:
+    ) -> Exact | tuple[MeshFile, Mesh]:
         """Read a surface and place it, as `surface.load`.
 
         Returns
@@ -93,7 +94,7 @@ class MeshStore:
             self._keep(entry, found, mesh)
         return found, mesh
 
-    def _read(self, source: Source, unit: str | None) -> surface.Exact | MeshFile:
+    def _read(self, source: Source, unit: str | None) -> Exact | MeshFile:
         key = (source.sha256, unit)
         found = self._held.pop(key, None) or surface.load(source, unit)
         if isinstance(found, MeshFile):

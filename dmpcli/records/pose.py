@@ -156,8 +156,3 @@ def _number(word: str) -> float | None:
         return float(word)
     except ValueError:
         return None
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of pose files."""
-    return json_files.json_schema(PoseFile, SCHEMA)

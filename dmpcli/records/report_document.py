@@ -8,10 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dmpcli.records import json_files
 from dmpcli.records.json_files import JsonPart
 
-SCHEMA, VERSION = "report", 1
+VERSION = 1
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -232,8 +231,3 @@ class Report(JsonPart):
     files: list[ReportedFile]
     skills: list[dict[str, Any]]
     paper: list[PaperTable]
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of ``report.json``."""
-    return json_files.json_schema(Report, SCHEMA)

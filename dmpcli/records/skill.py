@@ -307,8 +307,3 @@ def _layout(value: Any, indent: int = 0) -> str:
         inner = ",\n".join(" " * (indent + 2) + _layout(item, indent + 2) for item in value)
         return "[\n" + inner + "\n" + " " * indent + "]"
     return json.dumps(value, allow_nan=False, ensure_ascii=False)
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of skill files."""
-    return json_files.json_schema(SkillFile, SCHEMA)

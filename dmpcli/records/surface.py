@@ -2,31 +2,27 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dmpcli.errors import InputError
-from dmpcli.records import cylinder, json_files, mesh, mesh_formats, plane, sphere
+from dmpcli.records import exact_surface, json_files, mesh, mesh_formats
+from dmpcli.records.exact_surface import FILES, FORMS, Exact
 from dmpcli.records.file_io import Source
 from dmpcli.records.mesh import MeshFile
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.cylinder import Cylinder
 from dmpcli.surfaces.plane import Plane
-from dmpcli.surfaces.sphere import Sphere
-
-Exact = Plane | Cylinder | Sphere
-"""Surfaces that a JSON file gives in closed form."""
 
 MESH = "mesh"
 """Kind of surfaces that are no JSON file."""
 
 DECODERS: dict[str, Callable[[Source], Exact]] = {
-    plane.SCHEMA: plane.decode,
-    cylinder.SCHEMA: cylinder.decode,
-    sphere.SCHEMA: sphere.decode,
+    kind: partial(exact_surface.decode, kind=kind) for kind in FILES
 }
 """Readers of the files by their schema."""
 
-_KEYS = {"normal": plane.SCHEMA, "axis": cylinder.SCHEMA, "centre": sphere.SCHEMA}
+_KEYS = {"normal": "plane", "axis": "cylinder", "centre": "sphere"}
 """Keys that only one of the kinds has."""
 
 
@@ -47,7 +43,7 @@ def kind_of(document: Mapping[str, Any]) -> str | None:
 
 def kind(exact: Exact) -> str:
     """Return the kind of an exact surface, a key of `DECODERS`."""
-    return {Plane: plane.SCHEMA, Cylinder: cylinder.SCHEMA, Sphere: sphere.SCHEMA}[type(exact)]
+    return type(exact).__name__.lower()
 
 
 def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> Exact | MeshFile:
@@ -82,8 +78,8 @@ def load(source: Source, unit: str | None = None, pose: Pose | None = None) -> E
         said = document.get("schema")
         is_not = "tells no surface" if said is None else f"has schema {said!r}, not a surface's"
         raise InputError(
-            f"{source.name}: {is_not}: a plane is {plane.FORM}, a cylinder {cylinder.FORM}, "
-            f"a sphere {sphere.FORM}, in mm"
+            f"{source.name}: {is_not}: a plane is {FORMS['plane']}, a cylinder "
+            f"{FORMS['cylinder']}, a sphere {FORMS['sphere']}, in mm"
         )
     if unit not in (None, "mm"):
         raise InputError(f"{source.name}: {name} files are in mm; leave --surface-unit out")

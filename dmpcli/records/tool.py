@@ -304,8 +304,3 @@ def _geometry(file: ToolFile) -> Tool:
         weight=0.0,
         centre=np.zeros(3),
     )
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of tool files."""
-    return json_files.json_schema(ToolFile, SCHEMA)

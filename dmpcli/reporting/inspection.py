@@ -456,6 +456,6 @@ def json_schema(name: str) -> bytes:
     InputError
         There is none of that name.
     """
-    if name not in publish.SCHEMAS:
-        raise InputError(f"--schema {name}: no such schema; there are {', '.join(publish.SCHEMAS)}")
+    if name not in publish.FILES:
+        raise InputError(f"--schema {name}: no such schema; there are {', '.join(publish.FILES)}")
     return publish.text(name).encode()

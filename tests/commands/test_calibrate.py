@@ -8,7 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from dmpcli.records import record, schemas, static_poses
+from dmpcli.records import json_schema, record, schemas, static_poses
 from dmpcli.records import tool as tool_file
 from dmpcli.records.file_io import Source, read
 from dmpcli.simulation.mock import PEN
@@ -52,7 +52,7 @@ def test_the_file_obeys_its_schema_and_names_no_time_host_or_path(lab):
     folder, _ = lab
     text = (folder / "tool.json").read_text()
     document = json.loads(text)
-    jsonschema.validate(document, tool_file.schema())
+    jsonschema.validate(document, json_schema.schema("tool"))
     assert str(folder) not in text
     assert document["calibration"]["sensor"]["make"] == "mock"
     assert document["calibration"]["poses"] == 12

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dmpcli.errors import InputError
-from dmpcli.records import pose, surface
+from dmpcli.records import json_schema, pose, surface
 from dmpcli.records.file_io import Source
 from dmpcli.records.pose import Conditioning, Residuals
 from dmpcli.spatial.pose import Pose
@@ -44,7 +44,7 @@ def test_the_facts_of_a_registration_are_kept_and_obey_the_published_schema():
         {"unit": "m"},
         [{"role": "part", "sha256": "0"}],
     )
-    jsonschema.validate(json.loads(content), pose.schema())
+    jsonschema.validate(json.loads(content), json_schema.schema("pose"))
     file = pose.decode(Source("pose.json", content))[1]
     assert (file.residuals, file.conditioning) == (residuals, conditioning)
     assert file.options == {"unit": "m"}

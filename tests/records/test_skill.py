@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
 from dmpcli.errors import InputError
-from dmpcli.records import json_schema, plane, skill
+from dmpcli.records import exact_surface, json_schema, skill
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
 from tests.dmp.strokes import circle, paper_stroke
@@ -48,7 +48,7 @@ def test_a_force_profile_is_version_3_and_round_trips_exactly():
     stroke = replace(plain, contact_force=force)
     before, content = encoded(stroke, force_profile=True, normal=(0.0, 0.0, 1.0))
     document = json.loads(content)
-    jsonschema.validate(document, skill.schema())
+    jsonschema.validate(document, json_schema.schema("skill"))
     assert document["version"] == 3
     after, _ = skill.decode(Source("s.json", content))
     np.testing.assert_array_equal(after.force.weights, before.force.weights)
@@ -67,7 +67,7 @@ def test_a_skill_without_a_force_profile_keeps_its_version_and_its_bytes():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(json_schema.SCHEMAS))
+@pytest.mark.parametrize("name", sorted(json_schema.FILES))
 def test_the_published_json_schema_is_the_models(name):
     published = (json_schema.folder() / f"{name}.schema.json").read_text(encoding="utf-8")
     assert published == json_schema.text(name), "run make schemas"
@@ -75,9 +75,9 @@ def test_the_published_json_schema_is_the_models(name):
 
 
 def test_our_files_keep_to_their_published_schema():
-    jsonschema.validate(json.loads(encoded()[1]), skill.schema())
+    jsonschema.validate(json.loads(encoded()[1]), json_schema.schema("skill"))
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(json.loads(changed(tau=-1.0)), skill.schema())
+        jsonschema.validate(json.loads(changed(tau=-1.0)), json_schema.schema("skill"))
 
 
 def test_a_weight_is_on_a_line_of_its_axis():
@@ -129,7 +129,7 @@ def test_any_text_is_refused_by_name(text):
 
 
 def test_a_plane_is_a_point_and_a_normal_of_any_length():
-    found = plane.decode(Source("p", b'{"point": [1, 2, 3], "normal": [0, 0, 5]}'))
+    found = exact_surface.decode(Source("p", b'{"point": [1, 2, 3], "normal": [0, 0, 5]}'), "plane")
     np.testing.assert_array_equal(found.normal, [0, 0, 1])
 
 
@@ -149,4 +149,4 @@ def test_a_plane_is_a_point_and_a_normal_of_any_length():
 )
 def test_a_wrong_plane_file_is_refused_by_what_is_wrong(content, message):
     with pytest.raises(InputError, match=message):
-        plane.decode(Source("p.json", content))
+        exact_surface.decode(Source("p.json", content), "plane")

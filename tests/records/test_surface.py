@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dmpcli.errors import InputError
-from dmpcli.records import cylinder, json_schema, sphere, surface
+from dmpcli.records import json_schema, surface
 from dmpcli.records.file_io import Source
 from dmpcli.spatial import rotations
 from dmpcli.spatial.pose import Pose
@@ -92,8 +92,8 @@ def test_files_keep_to_their_published_schemas():
     import jsonschema
 
     for kind, (document, _) in KINDS.items():
-        jsonschema.validate(document, json_schema.SCHEMAS[kind]())
+        jsonschema.validate(document, json_schema.schema(kind))
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(CYLINDER | {"radius": 0}, cylinder.schema())
+        jsonschema.validate(CYLINDER | {"radius": 0}, json_schema.schema("cylinder"))
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate({"centre": [1, 2]}, sphere.schema())
+        jsonschema.validate({"centre": [1, 2]}, json_schema.schema("sphere"))

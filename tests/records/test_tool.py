@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dmpcli.admittance.payload_identification import Identification, PayloadEstimate
 from dmpcli.errors import InputError
-from dmpcli.records import tool
+from dmpcli.records import json_schema, tool
 from dmpcli.records.file_io import Source
 from dmpcli.simulation.mock import PEN
 from dmpcli.spatial.rotations import exp
@@ -74,7 +74,7 @@ def calibrated(**sensor):
 def test_the_file_obeys_its_published_schema():
     whole = json.loads(tool.encode(PEN, calibrated(make="mock", serial="7")))
     for document in (json.loads(TEXT), whole, json.loads(GEOMETRY.content)):
-        jsonschema.validate(document, tool.schema())
+        jsonschema.validate(document, json_schema.schema("tool"))
 
 
 GEOMETRY = changed(payload=None, calibration=None)
