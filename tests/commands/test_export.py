@@ -129,7 +129,9 @@ def test_a_run_leaves_with_the_joints_that_its_file_holds(files, tmp_path):
     assert poses.exit_code == 0
     drawn = table(tmp_path / "o.csv")
     np.testing.assert_array_equal(left["t [s]"], drawn["t [s]"])
-    again = forward(model("ec66"), np.column_stack([left[f"q{i} [rad]"] for i in range(1, 7)]))[0]
+    again = forward(
+        model("ec66"), np.column_stack([left[f"q{i} [rad]"] for i in range(1, 7)])
+    ).position
     np.testing.assert_allclose(
         again, np.column_stack([drawn[f"{n} [mm]"] for n in "xyz"]), atol=1e-6
     )
