@@ -71,7 +71,8 @@ def solve(
 ) -> tuple[Floats, Floats]:
     """Every set of joint angles that brings the flange to a pose.
 
-    Joint limits are not looked at.
+    Joint limits are not looked at. The poses are two arrays, as those of B paths with T samples are
+    in `path.follow`, which takes rows out of them again and again.
 
     Parameters
     ----------
