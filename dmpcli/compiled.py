@@ -5,8 +5,9 @@ kernel gives the same bytes on every processor and whatever stands beside it in 
 compiled is kept beside the program, or where NUMBA_CACHE_DIR says.
 """
 
+import pickle
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -16,4 +17,22 @@ Function = TypeVar("Function", bound=Callable[..., object])
 def kernel(function: Function) -> Function:
     """Compile a function when it is called first, and keep it."""
     made = njit(cache=True, fastmath=False, nogil=True, error_model="numpy")(function)
+    _forgive(made._cache)  # type: ignore[attr-defined]
     return cast(Function, made)
+
+
+def _forgive(kept: Any) -> None:
+    """Let a kernel be compiled anew where what is kept of it is another version's.
+
+    numba looks for the names of that version's types before it compares the source, and fails.
+    """
+    load = kept.load_overload
+
+    def loaded(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target)
+        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
+            kept.flush()
+            return None
+
+    kept.load_overload = loaded

@@ -7,7 +7,6 @@ many rows, by whether the extra is here, or by what the folder says that is gone
 
 import importlib.util
 import json
-import pickle
 from pathlib import Path
 from typing import Protocol
 
@@ -127,15 +126,7 @@ def get_ready(ready: "CompiledKernels | None" = None) -> None:
     ready = _to_draw() if ready is None else ready
     if not kept(ready):
         tell("kernels are compiled, once on this machine; it takes some 20 s of a processor")
-    try:
-        ready.load()
-    except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
-        # Kept by another version: numba looks for the names of that one before it compares.
-        tell("kernels that another version has left are compiled anew")
-        for folder, name in ready.files():
-            for path in Path(folder).glob(f"*{name}*.nb?") if folder else ():
-                path.unlink(missing_ok=True)
-        ready.load()
+    ready.load()
 
 
 class CompiledKernels(Protocol):
