@@ -151,7 +151,8 @@ def test_where_lengths_are_corrected_the_arm_moves_as_the_file_says(base, turn, 
         mujoco.mj_kinematics(model, data)
         theirs, ours = np.eye(4), np.eye(4)
         theirs[:3, 3], theirs[:3, :3] = 1e3 * data.xpos[-1], data.xmat[-1].reshape(3, 3)
-        ours[:3, 3], ours[:3, :3] = chain.forward_one(found.arm, joints)
+        flange = chain.forward_one(found.arm, joints)
+        ours[:3, 3], ours[:3, :3] = flange.position, flange.rotation
         return theirs, ours
 
     # B·ours·F = theirs in any posture, with the F of one of them.
