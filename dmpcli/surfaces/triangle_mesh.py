@@ -138,9 +138,17 @@ class TriangleMesh:
 
     def planes_at(self, face: Integers) -> Floats:
         """Unit normals of facets and their distances from the origin, shape (..., 4)."""
+        if self.compiled:
+            return self._planes.take(face, axis=0)
         a, b, c = np.moveaxis(self.V[self.F[face]], -2, 0)
         normal = unit(cross(b - a, c - a))
         return np.concatenate([normal, dot(normal, a)], axis=-1)
+
+    @cached_property
+    def _planes(self) -> Floats:
+        """Planes of all facets: many strokes ask for each, again and again."""
+        normal = self.face_normals
+        return np.concatenate([normal, dot(normal, self.corners[:, 0])], axis=-1)
 
     @cached_property
     def _known_maps(self) -> tuple[Floats, Booleans]:
@@ -205,7 +213,14 @@ class TriangleMesh:
 
     def search(self, points: Floats) -> tuple[Floats, Integers]:
         """Closest points (N, 3), mm, and their faces (N,); quickest in the order of a path."""
-        return self._facets.search(points)
+        if not self.compiled or not np.isfinite(points).all():
+            return self._facets.search(points)
+        from dmpcli.surfaces.kernels import tree
+
+        foot, face, doubt = tree.search(self.facets, np.ascontiguousarray(points))
+        if doubt.any():
+            foot[doubt], face[doubt] = self._facets.search(points[doubt])
+        return foot, face
 
     def smooth_normals(self, position: Floats, face: Integers) -> Floats:
         """Unit normals (N, 3) at points of faces, interpolated between the corners'."""

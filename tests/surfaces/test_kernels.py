@@ -109,7 +109,7 @@ def test_closest_points_are_those_of_the_library_from_everywhere():
         near = mesh.corners.mean(axis=1)[rng.integers(0, len(mesh.F), 500)]
         points = np.concatenate([points, near + rng.normal(0.0, 0.05, (500, 3))])
         foot, _ = mesh.search(points)
-        found, face = tree.search(mesh.facets, points)
+        found, face, _ = tree.search(mesh.facets, points)
         off = [np.linalg.norm(points - one, axis=1) for one in (foot, found)]
         np.testing.assert_allclose(off[1], off[0], atol=1e-12)
         corners = mesh.corners[face]

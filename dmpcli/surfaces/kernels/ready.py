@@ -11,6 +11,7 @@ _ENTRIES = (
     tree.ordered,
     tree.boxes_of,
     tree.fill,
+    tree.search,
     stepping.start,
     stepping.ends,
     stepping.lines,
@@ -52,6 +53,7 @@ def load() -> None:
         )
     ).facets
     v, one, number, mark = np.empty((0, 3)), np.empty((0, 1)), np.empty(0, np.int64), none[:0, 0]
+    tree.search(facets, v)
     walks = stepping.Walks(v, v, v, v, one, one, number, v, one[:, 0])
     limits = stepping.WalkLimits(0.9, -0.5, 0.3, 0.05, 0.01)
     stepping.start(facets, limits, walks, walks, mark)

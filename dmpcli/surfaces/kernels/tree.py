@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Halves, Integers, Singles
+from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
 from dmpcli.compiled import kernel
 from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
 
@@ -328,15 +328,17 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
 
 
 @kernel
-def search(facets: Facets, points: Floats) -> tuple[Floats, Integers]:
-    """Closest points (N, 3), mm, and their faces (N,)."""
+def search(facets: Facets, points: Floats) -> tuple[Floats, Integers, Booleans]:
+    """Closest points (N, 3), mm, their faces (N,), and which are `in_doubt`."""
     nodes, offs = stack()
     feet, face = np.empty_like(points), np.empty(len(points), dtype=np.int64)
+    doubt = np.empty(len(points), dtype=np.bool_)
     for i in range(len(points)):
-        foot, row = closest(facets, (points[i, 0], points[i, 1], points[i, 2]), nodes, offs)
+        p = points[i, 0], points[i, 1], points[i, 2]
+        foot, row = closest(facets, p, nodes, offs)
         feet[i, 0], feet[i, 1], feet[i, 2] = foot
-        face[i] = facets.numbers[row, FACE]
-    return feet, face
+        face[i], doubt[i] = facets.numbers[row, FACE], in_doubt(facets, p, foot, row)
+    return feet, face, doubt
 
 
 @kernel
