@@ -249,7 +249,7 @@ class TriangleMesh:
                 if len(self._recent) >= _FEW:
                     self._recent.clear()
                 self._recent[key] = known
-        position, face, normal = (values.copy() for values in known)
+        position, face, normal = known[0].copy(), known[1].copy(), known[2].copy()
         position = position.reshape(points.shape)
         return ClosestPoints(
             position,
