@@ -3,8 +3,8 @@
 Sections: ``lift`` (charts and lift on meshes, one process), ``draw`` (as a part of a batch is
 drawn, two processes, in memory), ``surface`` (`--orientation surface`, on a plane and on a mesh),
 ``files`` (`generalize` to Parquet), ``start`` (one stroke, a whole process). Times are of the
-processor, of all processes, but where it says so: what else a machine does tells less; each is the
-median of turns A B A B ...
+processor but where it says so, so that what else a machine does tells less; each is the median of
+turns A B A B ...
 """
 
 import multiprocessing
@@ -164,7 +164,7 @@ def surface(place: Path) -> None:
 
 
 def processor(words: list[str]) -> float:
-    """Processor time of a command and of those that it began, s."""
+    """Processor time of a command that is one process, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(words, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -172,7 +172,7 @@ def processor(words: list[str]) -> float:
 
 
 def files(place: Path) -> None:
-    """Print trajectories per second to Parquet by `--jobs 2`, sustained, by either means."""
+    """Print trajectories per second to Parquet, one process, sustained, by either means."""
     fitted(place)
     part, folder = place / "bumpy.ply", place / "batch"
     mesh = field_mesh(FACES[0])
@@ -180,14 +180,14 @@ def files(place: Path) -> None:
     few, many = 500, 2_500
     rows = curved_pairs(many)
     tables = {count: table_of(place, rows[:count], f"curved-{count}") for count in (few, many)}
-    words = ("--jobs", 2, "--surface", part, "--snap-tol", 1, "--on-error", "skip")
+    words = ("--surface", part, "--snap-tol", 1, "--on-error", "skip")
     times: dict[tuple[str, int], list[float]] = {}
     for _ in range(TURNS):
         for kernels in ("pure", "compiled"):
             for count, table in tables.items():
                 line = command(place, table, folder, *words, "--kernels", kernels)
                 times.setdefault((kernels, count), []).append(processor(line))
-    print(f"| `generalize --jobs 2`, {many} pairs less {few}, per CPU second | numpy | kernels |")
+    print(f"| `generalize`, {many} pairs less {few}, per CPU second | numpy | kernels |")
     print("| --- | ---: | ---: |")
     rates = [
         (many - few) / (np.median(times[kernels, many]) - np.median(times[kernels, few]))
