@@ -11,7 +11,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.batch.cut import Cut, by_site, in_order
 from dmpcli.batch.dataset_folder import Folder
 from dmpcli.batch.part import Job, Outcome, Part
-from dmpcli.batch.site import PairSites, SitesTold
+from dmpcli.batch.site import PairSites, Site, SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.rollout import Pairs
@@ -262,7 +262,15 @@ class Batch:
         """Names and hashes of the surfaces of some rows; empty where there is none."""
         assert self.sites is not None
         names = [site.surface.name for site in self.sites.sites] + [""]
-        hashes = [site.hashes()[0] or "" for site in self.sites.sites] + [""]
+        told: dict[Site, str | None] = {}
+        for number, outcome in self._outcomes.items():
+            # As whoever drew them read them.
+            for site, files in zip(self._part(number).sites, outcome.sites, strict=True):
+                told[site] = files[0]
+        hashes = [
+            (told[site] if site in told else site.hashes()[0]) or "" for site in self.sites.sites
+        ]
+        hashes.append("")
         of = self.sites.of[rows].tolist()
         return [names[i] for i in of], [hashes[i] for i in of]
 

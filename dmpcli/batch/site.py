@@ -7,7 +7,6 @@ cut into parts, and carried to those who draw them, before any of its surfaces i
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.batch.task import Task
@@ -40,10 +39,14 @@ class SiteFile:
         InputError
             It cannot be read.
         """
+        before = _state(self.path)
         try:
-            return file_io.Source(self.name, file_io.read(self.path).content)
+            source = file_io.Source(self.name, file_io.read(self.path).content)
         except InputError as error:
             raise InputError(str(error).replace(self.path, self.name)) from None
+        if before is not None and before == _state(self.path):
+            _remember(before, source.sha256)
+        return source
 
 
 @dataclass(frozen=True)
@@ -79,19 +82,39 @@ class Site:
         return [_hash(file.path) for file in self.files]
 
 
-def _hash(path: str) -> str | None:
+_State = tuple[str, int, int]
+"""Path of a file, and its size and time."""
+
+_MOST_KNOWN = 1 << 16
+_known: dict[_State, str] = {}
+"""Hashes of files by what they were: a surface that was read is not read again to be hashed."""
+
+
+def _state(path: str) -> _State | None:
     try:
         now = located(path).stat()
-        return _hash_then(path, now.st_size, now.st_mtime_ns)
     except OSError:
         return None
+    return path, now.st_size, now.st_mtime_ns
 
 
-@lru_cache(maxsize=1 << 16)
-def _hash_then(path: str, _size: int, _modified: int) -> str:
-    """Hash of a file as it was when it had this size and time."""
-    with located(path).open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _hash(path: str) -> str | None:
+    state = _state(path)
+    if state is None:
+        return None
+    if state not in _known:
+        try:
+            with located(path).open("rb") as stream:
+                _remember(state, hashlib.file_digest(stream, "sha256").hexdigest())
+        except OSError:
+            return None
+    return _known[state]
+
+
+def _remember(state: _State, sha256: str) -> None:
+    if len(_known) >= _MOST_KNOWN:
+        _known.clear()
+    _known[state] = sha256
 
 
 @dataclass(frozen=True)

@@ -169,7 +169,7 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
     try:
         with np.load(entry, allow_pickle=False) as packed:
             held = {name: packed[name] for name in packed.files}
-        V, F = held["V"].astype(float), _whole(held["F"])
+        V, F = held["V"].astype(float, copy=False), _whole(held["F"])
         pieces = held.get("components")
         components = np.zeros(len(F), dtype=np.int64) if pieces is None else _whole(pieces)
         adjacency = Adjacency(_whole(held["neighbours"]), components)

@@ -167,7 +167,7 @@ def hit(mesh: TriangleMesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     # facet to facet does not.
     stands_off = np.zeros(len(aim.steps))
     if shot is by_steps:
-        stands_off = mesh.reach_at(mesh.search(aim.goal)[1])
+        stands_off = mesh.reach_at(mesh.closest(aim.goal).face)
     found, ends, miss = _corrected(mesh, aim, shot, stands_off)
     missed = np.flatnonzero(miss > HIT)
     if len(missed):

@@ -8,6 +8,9 @@ import numpy as np
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.mesh_edges import pieces
 
+_LINE = np.array([0.2666, 0.6100, 0.7463])
+"""A direction, of length 1, to which hardly any two vertices of a part lie square."""
+
 
 @dataclass(frozen=True)
 class Adjacency:
@@ -149,13 +152,17 @@ class Topology:
 
 def places(V: Floats, ends: Integers) -> Integers:
     """Number the places of vertices (k, 2): those at one point, up to rounding, have one number."""
+    used, number = np.unique(ends, return_inverse=True)
+    reach = 1e-9 * float(np.abs(V[used]).max())
+    # What is near is near along any line, and hardly any two are: then there is nothing to search.
+    along = np.sort(V[used] @ _LINE)
+    if not (np.diff(along) <= 2.0 * reach).any():
+        return np.asarray(number.reshape(-1, 2), dtype=np.int64)
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    used, number = np.unique(ends, return_inverse=True)
-    scale = float(np.abs(V[used]).max())
-    near = cKDTree(V[used]).query_pairs(1e-9 * scale, output_type="ndarray")
+    near = cKDTree(V[used]).query_pairs(reach, output_type="ndarray")
     joined = coo_array((np.ones(len(near)), tuple(near.T)), shape=(len(used), len(used)))
     _, place = connected_components(joined, directed=False)
     return np.asarray(place[number].reshape(-1, 2), dtype=np.int64)

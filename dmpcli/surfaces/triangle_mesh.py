@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from dmpcli.surfaces.kernels.tree import Facets
     from dmpcli.surfaces.slits import Slits
 
+_FEW = 8
+"""So few closest points are remembered, of so many questions."""
+
+_AFTER, _BEFORE = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Corners of a face: the one after each, and the one before it; np.roll takes ten times as long."""
+
 # A point beside the border by less than this is on it, mm.
 ON_BORDER = 1e-2
 
@@ -56,6 +62,7 @@ class TriangleMesh:
         """The same mesh, on which compiled kernels walk: quicker, and the same but for rounding."""
         twin = type(self)(self.V, self.F)
         vars(twin).update(vars(self))
+        vars(twin).pop("_recent", None)  # found by other means
         twin.compiled = True
         return twin
 
@@ -138,9 +145,17 @@ class TriangleMesh:
 
     def planes_at(self, face: Integers) -> Floats:
         """Unit normals of facets and their distances from the origin, shape (..., 4)."""
+        if self.compiled:
+            return self._planes.take(face, axis=0)
         a, b, c = np.moveaxis(self.V[self.F[face]], -2, 0)
         normal = unit(cross(b - a, c - a))
         return np.concatenate([normal, dot(normal, a)], axis=-1)
+
+    @cached_property
+    def _planes(self) -> Floats:
+        """Planes of all facets: many strokes ask for each, again and again."""
+        normal = self.face_normals
+        return np.concatenate([normal, dot(normal, self.corners[:, 0])], axis=-1)
 
     @cached_property
     def _known_maps(self) -> tuple[Floats, Booleans]:
@@ -161,7 +176,7 @@ class TriangleMesh:
 
     def _made_maps(self, face: Integers) -> Floats:
         corners = self.V[self.F[face]] - self._middle
-        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+        opposite = corners[:, _BEFORE] - corners[:, _AFTER]
         n = cross(opposite[:, 0], opposite[:, 1])
         # Gradients of the barycentric coordinates: exact on slivers too.
         gradients = cross(n[:, None], opposite) / dot(n, n)[:, None]
@@ -205,7 +220,7 @@ class TriangleMesh:
 
     def search(self, points: Floats) -> tuple[Floats, Integers]:
         """Closest points (N, 3), mm, and their faces (N,); quickest in the order of a path."""
-        if not self.compiled:
+        if not self.compiled or not np.isfinite(points).all():
             return self._facets.search(points)
         from dmpcli.surfaces.kernels import tree
 
@@ -223,8 +238,18 @@ class TriangleMesh:
     def closest(self, points: Floats) -> ClosestPoints:
         """Closest points with smooth normals, see `Surface`."""
         points = np.asarray(points, dtype=float)
-        position, face = self.search(points.reshape(-1, 3))
-        normal = self.smooth_normals(position, face)
+        flat = points.reshape(-1, 3)
+        # Of a stroke's start and goal it is asked half a dozen times, by whoever looks at them.
+        key = flat.tobytes() if len(flat) <= _FEW else None
+        known = None if key is None else self._recent.get(key)
+        if known is None:
+            position, face = self.search(flat)
+            known = position, face, self.smooth_normals(position, face)
+            if key is not None:
+                if len(self._recent) >= _FEW:
+                    self._recent.clear()
+                self._recent[key] = known
+        position, face, normal = known[0].copy(), known[1].copy(), known[2].copy()
         position = position.reshape(points.shape)
         return ClosestPoints(
             position,
@@ -232,6 +257,11 @@ class TriangleMesh:
             length(points - position)[..., 0],
             face.reshape(points.shape[:-1]),
         )
+
+    @cached_property
+    def _recent(self) -> dict[bytes, tuple[Floats, Integers, Floats]]:
+        """Closest points, faces and normals of the last few points, by their bytes."""
+        return {}
 
     def closest_along(self, paths: Floats) -> tuple[Floats, Floats]:
         """Closest points of paths (B, T, 3), mm, and smooth normals there, both (B, T, 3)."""
@@ -274,7 +304,7 @@ class TriangleMesh:
     def _on_border(self, position: Floats, face: Integers) -> Booleans:
         """Tell which points of faces are on a border edge or a border's corner."""
         corners = self.V[self.F[face]]
-        edges = np.roll(corners, -1, axis=1) - corners
+        edges = corners[:, _AFTER] - corners
         size = np.sum(edges**2, axis=-1)
         offset = position[:, None] - corners
         along = np.clip(np.sum(offset * edges, axis=-1) / size, 0.0, 1.0)

@@ -90,6 +90,21 @@ def test_places_are_one_where_vertices_lie_on_one_another():
     assert len(np.unique(found)) == 3
 
 
+@pytest.mark.parametrize("twins", [0, 1, 5])
+@pytest.mark.parametrize("square", [False, True])
+def test_places_are_those_of_all_distances_whether_any_lie_together_or_not(twins, square):
+    rng = np.random.default_rng(twins)
+    V = rng.uniform(-50.0, 50.0, (60, 3))
+    if square:  # many lie in one plane, and none together
+        V = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3)
+    again = rng.choice(len(V), twins, replace=False)
+    V = np.concatenate([V, V[again] + rng.uniform(-1e-9, 1e-9, (twins, 3))])
+    ends = rng.permutation(2 * len(V)).reshape(-1, 2) % len(V)
+    found = places(V, ends).reshape(-1)
+    apart = np.linalg.norm(V[ends.reshape(-1)][:, None] - V[ends.reshape(-1)], axis=-1)
+    np.testing.assert_array_equal(found[:, None] == found, apart < 1e-8)
+
+
 def test_sizes_angles_and_sides_of_a_mesh_are_trimeshs():
     V, F = open_part()
     mesh, theirs = TriangleMesh(V, F), trimesh.Trimesh(V, F, process=False)
