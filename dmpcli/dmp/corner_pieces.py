@@ -33,6 +33,8 @@ _WINDOWS, _CHANCE = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512), 1e-4
 _APART = 2.0
 # Position and derivatives in which pieces may meet, and the chance by which each does not.
 _JOINED, _APART_BY_CHANCE = 3, 1e-4
+# Least eigenvalue of correlated ends, below which one of them says nothing of its own.
+_SINGULAR = 1e-9
 # Fewest samples of a piece.
 FEWEST = 3
 
@@ -250,11 +252,16 @@ def joint(before: Piece, after: Piece, variance: float) -> tuple[int, float]:
     axes = gap.shape[1]
     doubt = float(chdtri(axes, _APART_BY_CHANCE)) / axes
     covariance = before.covariance[1, :, 1, :] + after.covariance[0, :, 0, :]
+    scale = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
+    scaled = covariance / np.outer(scale, scale)
     smooth, least, last = 1, 0.0, 0.0
     # What a line has no second derivative for is not asked of it.
     for size in range(1, 1 + min(_JOINED, int(before.size), int(after.size))):
-        pull = np.linalg.solve(covariance[:size, :size], gap[:size])
-        cost = float(np.sum(gap[:size] * pull)) / variance
+        part = scaled[:size, :size]
+        if size > 1 and np.linalg.eigvalsh(part)[0] < _SINGULAR:
+            break
+        asked = gap[:size] / scale[:size, None]
+        cost = float(np.sum(asked * np.linalg.solve(part, asked))) / variance
         if size > 1 and cost - last > doubt:
             break
         smooth, last = size, cost

@@ -15,7 +15,7 @@ from dmpcli.dmp import corner_pieces, corner_search
 from dmpcli.dmp.corner_pieces import COST, Piece
 from dmpcli.dmp.corner_search import Candidate
 from dmpcli.dmp.least_squares import Design
-from dmpcli.dmp.noise import Noise
+from dmpcli.dmp.noise import ROUNDING, Noise
 
 # Samples up to which corners are looked for.
 _MOST = 50_000
@@ -62,7 +62,9 @@ def cornered(
         Its intervals. Where they are uniform, noise explains what it leaves: corners are few then,
         or so many that they must cost less at once.
     """
-    if noise.kind != "white" or noise.typical == 0.0 or len(x) > _MOST:
+    extent = float(np.linalg.norm(np.ptp(x, axis=0)))
+    # What rounding does at a corner is not worth the search.
+    if noise.kind != "white" or noise.typical <= ROUNDING * extent or len(x) > _MOST:
         return None
     uniform = spline is not None and spline.uniform
     breaks = np.zeros(0) if spline is None else spline.breaks / spline.step
@@ -92,7 +94,11 @@ def cornered(
     if best is None:
         return None
     smooth_at = [corner_pieces.joint(*two, variance)[0] for two in pairwise(best)]
-    values, jumps = corner_pieces.joined(best, smooth_at)
+    try:
+        values, jumps = corner_pieces.joined(best, smooth_at)
+    except np.linalg.LinAlgError:
+        # Pieces of a few samples each cannot meet in all that.
+        return None
     residual = x - values
     size = sum(piece.size for piece in best) - sum(smooth_at)
     cost = float(np.sum(residual**2)) / variance + COST * size + _places(len(at), x)

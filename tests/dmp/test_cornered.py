@@ -1,5 +1,7 @@
 """Strokes with corners, judged by their closed form: what is smooth between them stays so."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -91,7 +93,7 @@ def test_a_stroke_that_stops_where_it_turns_is_not_kinked(sigma):
     """From rest to rest by five legs: it turns, but its velocity does not jump."""
     V = np.array([[0, 0, 0], [60, 20, 0], [80, 70, 0], [20, 60, 0], [10, 10, 0], [90, 0, 0.0]])
     u = jerk(np.arange(1, 121) / 120.0)[:, None]
-    truth = np.concatenate([V[:1], *(a + (b - a) * u for a, b in zip(V, V[1:], strict=False))])
+    truth = np.concatenate([V[:1], *(a + (b - a) * u for a, b in pairwise(V))])
     t = np.arange(len(truth)) / 100.0
     exact = np.linalg.norm(smoothed(t, truth)(t, 2), axis=1).max()
     for seed in range(5):
@@ -140,10 +142,7 @@ def test_pieces_meet_by_the_least_change_of_all():
     x += np.column_stack([np.arange(90.0), np.abs(np.arange(90.0) - 44.4)])
     white = Noise(np.eye(2), np.full(2, 0.3))
     edges = [0.0, 20.7, 44.4, 89.0]
-    pieces = [
-        corner_pieces.between(x, a, b, white, 0.18, np.zeros(0))
-        for a, b in zip(edges, edges[1:], strict=False)
-    ]
+    pieces = [corner_pieces.between(x, a, b, white, 0.18, np.zeros(0)) for a, b in pairwise(edges)]
     assert all(piece.smooth for piece in pieces)
     values, _ = corner_pieces.joined(pieces, [1, 1])
     j = np.arange(90.0)
