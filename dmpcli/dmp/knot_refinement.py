@@ -70,34 +70,34 @@ def refined(
     (Design, array) or None
         None where intervals would be halved everywhere.
     """
-    best = _halved(design, c, x, noise)
+    best = halved(design, c, x, noise)
     rounds = min(_HALVINGS, _EFFORT // len(x))
     if noise.kind != "white" or noise.typical == 0.0 or rounds == 0:
         return best
-    cost = np.inf
+    least = np.inf
     if best is not None:
         best = _tried(*best, x, noise, rounds)
-        cost = _cost(*best, x, variance)
+        least = cost(*best, x, variance)
     # Intervals of 1, 2, 4 ... samples: the shortest then hold one, and not nearly two.
     halvings = int(np.ceil(np.log2(2.0 * (len(x) - 1) / design.intervals)))
     fewer = (len(x) - 1) >> halvings
     if fewer >= _FEWEST and rounds == _HALVINGS:
         coarse = least_squares.uniform(len(x), fewer)
-        other = _halved(coarse, coarse.coefficients(x), x, noise)
+        other = halved(coarse, coarse.coefficients(x), x, noise)
         if other is not None:
             other = _tried(*other, x, noise, rounds)
-            if _cost(*other, x, variance) < cost - _CLEARLY:
+            if cost(*other, x, variance) < least - _CLEARLY:
                 return other
     return best
 
 
-def _cost(design: Design, c: Floats, x: Floats, variance: float) -> float:
+def cost(design: Design, c: Floats, x: Floats, variance: float) -> float:
     """Mallows' Cp, in variances."""
     residual = x - design.values(c)
     return float(np.sum(residual**2)) / variance + _COST * design.size
 
 
-def _halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design, Floats] | None:
+def halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design, Floats] | None:
     """Halve intervals where sliding means of the residual are doubted; None if everywhere."""
     for i in range(_HALVINGS):
         doubted = _doubted(x - design.values(c), design, noise, x, i == 0)
@@ -228,6 +228,11 @@ def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats, first: b
     if len(found) == 0:
         return np.zeros(count, dtype=bool)
     return np.asarray(np.any(squares >= candidates[found[-1]], axis=0))
+
+
+def squares(residual: Floats, sigma: float, windows: tuple[int, ...]) -> Floats:
+    """χ² of sliding means of residuals (n, D) at their middles, and of peaks, (W + 1, n)."""
+    return _squares(residual, sigma, 0.0, windows, len(residual))
 
 
 def _squares(

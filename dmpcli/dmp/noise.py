@@ -15,6 +15,9 @@ from dmpcli.dmp import least_squares
 
 Kind = Literal["white", "band", "quantised", "unknown"]
 
+ROUNDING = 1e-5
+"""Noise below this part of the stroke's extent is rounding."""
+
 # Mean of the lower three quarters of sums of squares of two standard normal numbers.
 _LOWER = 0.75
 _MEAN_OF_LOWER = 2.0 * (1.0 - 0.25 * (1.0 + np.log(4.0))) / 0.75
@@ -22,8 +25,6 @@ _MEAN_OF_LOWER = 2.0 * (1.0 - 0.25 * (1.0 + np.log(4.0))) / 0.75
 _APART = 4.0
 # Fewer samples do not tell noise from stroke.
 FEWEST = 40
-# Noise below this part of the stroke's extent is rounding.
-_ROUNDING = 1e-5
 # Bands per octave, octaves that a plateau spans at least, and its slope and spread, in decades.
 _BANDS = 3
 _PLATEAU = 5 / 3
@@ -144,7 +145,7 @@ def estimate(x: Floats, partial: bool = True) -> Noise:
         return Noise(axes, sigma)
     first, last, coefficients = band
     plateau_axes, plateau = _spread(coefficients)
-    if float(np.max(plateau)) < _ROUNDING * extent:
+    if float(np.max(plateau)) < ROUNDING * extent:
         return Noise(axes, sigma)
     half = 0.5 * count
     return Noise(plateau_axes, plateau, "band", reach=last / half, stroke=first / half)

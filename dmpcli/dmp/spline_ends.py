@@ -211,16 +211,19 @@ def with_ends(design: Design, c: Floats, variance: float) -> tuple[Floats, tuple
 
 
 def _derivatives(knots: Floats) -> Floats:
-    """Derivatives 0 … 5 at the first knot, by the first six coefficients, shape (6, 6).
+    """`derivatives`, scaled so that each row's largest entry is 1."""
+    rows = derivatives(knots)
+    return np.asarray(rows / np.max(np.abs(rows), axis=1, keepdims=True))
 
-    Scaled so that each row's largest entry is 1.
-    """
+
+def derivatives(knots: Floats) -> Floats:
+    """Derivatives 0 … 5 at the first knot, by the first six coefficients, shape (6, 6)."""
     rows = np.zeros((DEGREE + 1, DEGREE + 1))
     level = np.eye(DEGREE + 1)
     rows[0] = level[0]
     for order in range(1, DEGREE + 1):
         degree = DEGREE - order + 1
         spans = knots[order + degree : order + degree + len(level) - 1] - knots[DEGREE]
-        level = np.diff(level, axis=0) / spans[:, None]
-        rows[order] = level[0] / np.max(np.abs(level[0]))
+        level = degree * np.diff(level, axis=0) / spans[:, None]
+        rows[order] = level[0]
     return rows

@@ -7,12 +7,14 @@ intervals are halved there and only there.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.dmp import knot_refinement, least_squares
+from dmpcli.dmp.corner_pieces import COST
+from dmpcli.dmp.cornered import Cornered, cornered
 from dmpcli.dmp.flat_directions import moving_axes
 from dmpcli.dmp.knot_refinement import ROUNDING
 from dmpcli.dmp.least_squares import DEGREE, Design
@@ -64,6 +66,8 @@ class SmoothSpline:
         Root mean square of what smoothing took off, over all axes, unit of the samples.
     rests : tuple of bool
         Whether the spline begins and ends at rest, since the samples do not contradict it.
+    corners : int
+        Corners between which it was smoothed; K is then that of the finest piece.
     """
 
     spline: "BSpline"
@@ -73,6 +77,7 @@ class SmoothSpline:
     smoothed_noise: float
     removed: float
     rests: tuple[bool, bool]
+    corners: int = 0
 
     @property
     def finest(self) -> int:
@@ -128,16 +133,23 @@ def smooth(
         K: int | None = max(1, round(2.0 * duration * cutoff))
     else:
         K = _intervals(moving, variance)
-    if K is None or _too_many(K, count):
+    fitted = None
+    if K is not None and not _too_many(K, count):
+        design = least_squares.uniform(count, K)
+        fitted = design, design.coefficients(moving)
+        if cutoff is None:
+            fitted = knot_refinement.refined(*fitted, moving, inside, variance)
+    if cutoff is None and not resampled:
+        # Through all samples there is nothing left, and as many coefficients.
+        cost = COST * count if fitted is None else knot_refinement.cost(*fitted, moving, variance)
+        corners = cornered(moving, inside, variance, cost, fitted and fitted[0])
+        if corners is not None:
+            return _between_corners(centred, middle, axes, duration, noise, inside, corners)
+    if K is None or fitted is None:
         return _interpolating(x, duration, noise, resampled)
-    design = least_squares.uniform(count, K)
-    c = design.coefficients(moving)
+    design, c = fitted
     rests = (False, False)
     if cutoff is None:
-        refined = knot_refinement.refined(design, c, moving, inside, variance)
-        if refined is None:
-            return _interpolating(x, duration, noise, resampled)
-        design, c = refined
         c, rests = with_ends(design, c, variance)
     c = c @ axes.T
     residual = centred - design.values(c)
@@ -151,6 +163,47 @@ def smooth(
         float(np.sqrt(inside.total / x.shape[1] * design.intervals / count)),
         float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))),
         rests,
+    )
+
+
+def _between_corners(
+    centred: Floats,
+    middle: Floats,
+    axes: Floats,
+    duration: float,
+    noise: Noise,
+    inside: Noise,
+    found: Cornered,
+) -> SmoothSpline:
+    """Go through samples without their noise: as a recording of the corners without any is."""
+    from scipy.interpolate import make_interp_spline
+
+    count = len(centred)
+    values = found.values @ axes.T
+    t = np.linspace(0.0, duration, count)
+    spline = make_interp_spline(t, values, k=DEGREE)
+    if any(found.rests):
+        ends: Any = []
+        for at, rest in zip((0.0, duration), found.rests, strict=True):
+            ends.append([(n, 0.0 * middle if rest else spline(at, n)) for n in (1, 2)])
+        spline = make_interp_spline(t, values, k=DEGREE, bc_type=ends)
+        # To the last digit, so that the drawn velocity is zero.
+        if found.rests[0]:
+            spline.c[1:3] = spline.c[0]
+        if found.rests[1]:
+            spline.c[-3:-1] = spline.c[-1]
+    residual = centred - values
+    spline.c = spline.c + middle
+    intervals = max(1, round(found.finest * (count - 1)))
+    return SmoothSpline(
+        spline,
+        intervals,
+        intervals / (2.0 * duration),
+        noise,
+        float(np.sqrt(inside.total / len(middle) * found.size / count)),
+        float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))),
+        found.rests,
+        len(found.corners),
     )
 
 

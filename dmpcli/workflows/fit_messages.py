@@ -96,7 +96,11 @@ def _reproduced(prepared: "Prepared", r: "ReproductionMeasures") -> str:
     before, after = prepared.trimmed
     smoothing = "not smoothed"
     if prepared.cutoff is not None:
-        smoothing = f"smoothing ({prepared.cutoff:.2f} Hz) took off {prepared.removed:.4f} mm RMS"
+        corners = 0 if prepared.seen is None else prepared.seen.position.corners
+        kept = f" between {corners} corner{'s' if corners > 1 else ''}" if corners else ""
+        smoothing = (
+            f"smoothing ({prepared.cutoff:.2f} Hz{kept}) took off {prepared.removed:.4f} mm RMS"
+        )
     noise = "" if prepared.seen is None else f"noise {prepared.seen.sigma:.3f} mm, "
     return (
         f"reproduction RMS {r.rms:.4f} mm, largest {r.largest:.4f}, end {r.end:.4f}; {noise}"

@@ -574,7 +574,7 @@ def splines_halved_at_corners():
         n = noise.Noise(np.eye(2), np.full(2, 0.05))
         for intervals in (4, 9, 30):
             design = least_squares.uniform(len(x), intervals)
-            halved = knot_refinement._halved(design, design.coefficients(x), x, n)
+            halved = knot_refinement.halved(design, design.coefficients(x), x, n)
             found += [None] if halved is None else [halved[0].breaks, halved[1]]
     return found
 
