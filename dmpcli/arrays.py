@@ -14,6 +14,7 @@ Singles: TypeAlias = NDArray[np.float32]
 Halves: TypeAlias = NDArray[np.int32]
 """Arrays of half the size, where kernels read much of them."""
 
+Bytes: TypeAlias = NDArray[np.uint8]
 Booleans: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 

@@ -95,7 +95,7 @@ def lowered(waves: Floats, cutoff: float, order: int) -> Floats:
     terms = _dst(waves)
     terms /= steps
     terms *= 1.0 / (1.0 + ratio ** (2 * order))
-    left = _dst(terms)
+    left = _dst(terms, overwrite=True)
     left *= 0.5
     return left
 
@@ -107,7 +107,7 @@ def _line(start: Floats, end: Floats, samples: int) -> Floats:
     return line
 
 
-def _dst(x: Floats) -> Floats:
+def _dst(x: Floats, overwrite: bool = False) -> Floats:
     from scipy.fft import dst
 
-    return np.asarray(dst(x, type=1, axis=-1)) if x.shape[-1] else x
+    return np.asarray(dst(x, type=1, axis=-1, overwrite_x=overwrite)) if x.shape[-1] else x

@@ -230,13 +230,15 @@ def _folded(speed: Floats, size: int, count: int) -> Floats:
     There cosines go with what a speed has in common with its mirror image, sines with the rest.
     """
     n = speed.shape[1]
-    cosine, sine = _half_waves(n, size, count)
-    half = len(cosine)
+    half = n - n // 2
     mirrored = speed[:, : n - half - 1 : -1]
     even, odd = speed[:, :half] + mirrored, speed[:, :half] - mirrored
     if n % 2:
         even[:, -1] *= 0.5  # the middle is its own image
-    real, imaginary = even @ cosine, odd @ sine
+    nodes, lines = _half_waves(n, size, count)
+    real, imaginary = (
+        (part @ at) @ to for part, at, to in zip((even, odd), nodes, lines, strict=True)
+    )
     real *= real
     imaginary *= imaginary
     real += imaginary
@@ -244,11 +246,27 @@ def _folded(speed: Floats, size: int, count: int) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def _half_waves(n: int, size: int, count: int) -> tuple[Floats, Floats]:
-    """Cosines and sines of the first lines up to the middle of n samples, (n / 2, count) each."""
+def _half_waves(n: int, size: int, count: int) -> tuple[tuple[Floats, Floats], ...]:
+    """Cosines and sines at some frequencies, (n / 2, m) each, and how lines follow from these.
+
+    So short a signal has no room for more than few waves below the last line, so that its spectrum
+    is a polynomial but for rounding: m Chebyshev nodes in place of all lines, and (m, count) from
+    the ones to the others.
+    """
     from_middle = np.arange(n - n // 2) - 0.5 * (n - 1)
-    turn = 2.0 * np.pi / size * np.outer(from_middle, np.arange(count))
-    return np.cos(turn), np.sin(turn)
+    last = 2.0 * np.pi / size * (count - 1)
+    turns = 0.5 * last * (n - 1)
+    # Bessel functions of that argument are below the rounding beyond this order.
+    m = int(np.ceil(0.5 * (turns + 8.0 * np.cbrt(turns)))) + 5
+    node = np.pi * (2.0 * np.arange(m) + 1.0) / (4.0 * m)
+    line = np.arccos(np.arange(count) / (count - 1.0))
+    turn = np.outer(from_middle, last * np.cos(node))
+    order = 2.0 * np.arange(m)
+    share = np.where(order > 0.0, 2.0, 1.0) / m
+    even = np.cos(np.outer(node, order)) * share @ np.cos(np.outer(order, line))
+    order += 1.0
+    odd = np.cos(np.outer(node, order)) * (2.0 / m) @ np.cos(np.outer(order, line))
+    return (np.cos(turn), np.sin(turn)), (even, odd)
 
 
 @lru_cache(maxsize=4)

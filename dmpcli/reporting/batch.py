@@ -207,8 +207,9 @@ class Measurement:
         if not self.told:
             return MeasuredStrokes(some.rows, some.table, shown, "", "")
         ids = batch.ids.take(pa.array(some.rows)).to_pylist()
-        waves = _wave_rows(some, self.label, ids)
-        strokes = _stroke_rows(some, self.label, ids, batch)
+        compiled = self.sight.compiled
+        waves = _wave_rows(some, self.label, ids, compiled)
+        strokes = _stroke_rows(some, self.label, ids, batch, compiled)
         return MeasuredStrokes(some.rows, some.table, shown, waves, strokes)
 
     def apart(self, batch: BatchFolder) -> "Measurement":
@@ -325,7 +326,7 @@ def histogram(
     return {"edges": edges.tolist(), "counts": counts.tolist()}
 
 
-def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> str:
+def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str], compiled: bool) -> str:
     """Every wave height, as in `document.write_waves`."""
     waves = some.waves
     ends = waves.ends
@@ -335,31 +336,51 @@ def _wave_rows(some: MeasuredBlock, label: str, ids: Sequence[str]) -> str:
     numbers = np.column_stack(
         [waves.heights, t[ends - 1], t[ends], waves.value[ends - 1], waves.value[ends]]
     )
-    names = [_cell(f"{label}[{name}]") for name in ids]
-    form = ",".join(["%s", some.role, "%d"] + ["%.6f"] * numbers.shape[1]) + "\n"
-    cells = zip(stroke.tolist(), number.tolist(), numbers.tolist(), strict=True)
-    return "".join([form % (names[i], k, *row) for i, k, row in cells])
+    names = _cells([f"{label}[{name}]" for name in ids])
+    heads = [
+        f"{names[i]},{some.role},{k}" for i, k in zip(stroke.tolist(), number.tolist(), strict=True)
+    ]
+    return _lines(heads, numbers, compiled)
 
 
-def _stroke_rows(some: MeasuredBlock, label: str, ids: Sequence[str], batch: BatchFolder) -> str:
+def _stroke_rows(
+    some: MeasuredBlock, label: str, ids: Sequence[str], batch: BatchFolder, compiled: bool
+) -> str:
     """The figures of every stroke; nothing where there is none."""
     first = _cell(label)
     files = [_cell(file) for file in batch.files]
     part = batch.part[some.rows].tolist()
-    known = np.isfinite(some.table)
+    cells = zip(_cells(ids), part, strict=True)
+    return _lines([f"{first},{name},{files[file]}" for name, file in cells], some.table, compiled)
+
+
+def _lines(heads: Sequence[str], numbers: Floats, compiled: bool) -> str:
+    """Rows of a CSV file: heads, and numbers (k, c) after them, nothing where there is none."""
+    if compiled:
+        from dmpcli.reporting import decimals
+
+        text = decimals.rows(heads, numbers)
+        if text is not None:
+            return text
+    known = np.isfinite(numbers)
     # Strokes that are measured together mostly have the same figures.
-    forms = {}
-    cells = zip(ids, part, known, some.table.tolist(), strict=True)
+    forms: dict[bytes, str] = {}
     lines = []
-    for name, file, which, numbers in cells:
+    for head, which, values in zip(heads, known, numbers.tolist(), strict=True):
         kind = which.tobytes()
         if kind not in forms:
-            forms[kind] = "%s,%s,%s" + "".join(",%.6f" if one else ",%.0s" for one in which) + "\n"
-        lines.append(forms[kind] % (first, _cell(name), files[file], *numbers))
+            forms[kind] = "%s" + "".join(",%.6f" if one else ",%.0s" for one in which) + "\n"
+        lines.append(forms[kind] % (head, *values))
     return "".join(lines)
 
 
 _QUOTED = re.compile('[,"\r\n]')
+
+
+def _cells(texts: Sequence[str]) -> Sequence[str]:
+    """Return texts as cells of a CSV file."""
+    # Hardly any needs quotes: seen at once.
+    return [_cell(text) for text in texts] if _QUOTED.search("".join(texts)) else texts
 
 
 def _cell(text: str) -> str:

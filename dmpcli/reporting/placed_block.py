@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.metrics import many_on_surface as measure
 from dmpcli.metrics.wave_height import ManyWaves, many_waves
 from dmpcli.surfaces.inverse_chart import invert, on_strips
@@ -121,10 +121,10 @@ def placed(
         return _on_plane(block, surface, taught, taught_length)
     ends = surface.closest(np.stack([block.start, block.goal], axis=1))
     sign = towards(ends.normal[:, 0], block.side)
-    foot, normal = _closest(block, surface, block.points)
+    foot, normal, where = _closest(block, surface, block.points)
     normal = sign[:, None] * normal
     lengths, uv = _coordinates(
-        block, surface, ends.position, sign * ends.normal[:, 0], foot, course
+        block, surface, ends.position, sign * ends.normal[:, 0], foot, where, course
     )
     charted: Booleans = np.logical_and.reduce(np.isfinite(uv), axis=(0, 2))
     height, length = _over_feet(block, foot, normal)
@@ -139,7 +139,7 @@ def placed(
         if block.bound and charted.any():
             phase = block.t / block.t[-1]
             off[charted] = taught.at(phase, uv[:, charted], stretch[charted])
-    distance = _distances(block, surface, foot, normal, off)
+    distance = _distances(block, surface, foot, normal, height, off)
     waves = many_waves(
         np.where(charted[:, None], uv[1], 0.0),
         np.where(charted, lengths, 1.0),
@@ -207,12 +207,14 @@ def _on_plane(
     return PlacedBlock(place, charted, lengths, waves, figures | _tilts(block, normal[:, None]))
 
 
-def _closest(block: Block, surface: Surface, points: Floats) -> tuple[Floats, Floats]:
-    """Closest points of strokes (k, n, 3), mm, and normals there."""
+def _closest(
+    block: Block, surface: Surface, points: Floats
+) -> tuple[Floats, Floats, Integers | None]:
+    """Closest points of strokes (k, n, 3), mm, normals there, and facets (k, n) by kernels."""
     if block.compiled and isinstance(surface, Mesh):
         return surface.with_kernels.closest_along(points)
     found = surface.closest(points)
-    return found.position, found.normal
+    return found.position, found.normal, None
 
 
 def _over_feet(block: Block, foot: Floats, normal: Floats) -> tuple[Floats, Floats]:
@@ -258,6 +260,7 @@ def _coordinates(
     ends: Floats,
     normal: Floats,
     foot: Floats,
+    where: Integers | None,
     course: Course | None,
 ) -> tuple[Floats, Floats]:
     """Geodesic lengths (k,), mm, and u, v (2, k, n); NaN where there is no chart or it ends."""
@@ -268,11 +271,11 @@ def _coordinates(
         return lengths, uv
     # A stroke that knows no surface may be anywhere: the closest points say where it is over.
     position = block.points if block.bound else foot
-    if block.compiled and isinstance(surface, Mesh):
+    if where is not None and isinstance(surface, Mesh):
         # What is not found on smooth strips is searched for, and rounding would tell how that ends:
         # so numpy does it, as for a single stroke.
         by_kernels = surface.with_kernels.charts(ends[rows, 0], ends[rows, 1], normal[rows])
-        found = on_strips(by_kernels, position[rows], course)
+        found = on_strips(by_kernels, position[rows], course, (foot[rows], where[rows]))
         whole = found.complete
         lengths[rows[whole]] = by_kernels.lengths[whole]
         uv[:, rows[whole]] = found.coordinates[whole, :, :2].transpose(2, 0, 1)
@@ -288,14 +291,18 @@ def _coordinates(
     return lengths, uv
 
 
-def _distances(block: Block, surface: Surface, foot: Floats, normal: Floats, off: Floats) -> Floats:
+def _distances(
+    block: Block, surface: Surface, foot: Floats, normal: Floats, height: Floats, off: Floats
+) -> Floats:
     """Distances (k, n) to the surface once intended heights are taken off; see `on_surface`."""
+    lifted = off != 0.0
+    if not lifted.any():
+        return np.abs(height)
     away = block.points - off[..., None] * normal
     below = foot
-    lifted = off != 0.0
     if lifted.all():
         below = _closest(block, surface, away)[0]
-    elif lifted.any():
+    else:
         # Where nothing was meant to be lifted the closest points are known.
         below = foot.copy()
         below[lifted] = surface.closest(away[lifted]).position

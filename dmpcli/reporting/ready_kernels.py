@@ -7,6 +7,7 @@ from dmpcli.metrics.kernels import lying, polyline, strokes
 from dmpcli.metrics.many_on_surface import TaughtHeights
 from dmpcli.metrics.motion import motions
 from dmpcli.metrics.wave_height import many_waves
+from dmpcli.reporting import decimals
 from dmpcli.surfaces.kernels import inverse
 from dmpcli.surfaces.kernels import ready as surfaces
 from dmpcli.surfaces.mesh import Mesh
@@ -14,7 +15,7 @@ from dmpcli.surfaces.mesh import Mesh
 _STROKES = (
     *(polyline.deviations, polyline.heights_there),
     *(strokes.charted, strokes.ways, strokes.less_line, strokes.smoothness),
-    *(strokes.turning_points, strokes.swings),
+    *(strokes.turning_points, strokes.swings, decimals.written),
     *(lying.tilts, lying.over_plane, lying.spreads, lying.over_feet, lying.stretched_lengths),
 )
 _ON_MESHES = (
@@ -52,6 +53,7 @@ def _load_strokes() -> None:
     lying.spreads(height, height, length, length)
     lying.tilts(height, height, normal, length, length)
     lying.stretched_lengths(points[0], one)
+    decimals.rows(["a"], v)
 
 
 def _load_on_meshes() -> None:
@@ -60,7 +62,8 @@ def _load_on_meshes() -> None:
     v, one, two = np.zeros((1, 1, 3)), np.ones((1, 1)), np.zeros(2)
     none = np.zeros(1, dtype=np.int64)
     limits = inverse.FootLimits(1, 1.0)
-    inverse.feet(mesh.facets, v, one, limits, v, v, one, np.zeros((1, 1), dtype=bool))
+    near = v, np.zeros((1, 1), dtype=np.int64)
+    inverse.feet(mesh.facets, v, near, one, limits, v, v, one, np.zeros((1, 1), dtype=bool))
     at = inverse.guesses(v, v, v, none, none, 0, one[0], v)
     inverse.extents(at)
     step, nodes = np.ones((1, 2)), np.zeros((1, 2, 2, 12))

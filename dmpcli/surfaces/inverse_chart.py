@@ -13,6 +13,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces import strip_inverse
 from dmpcli.surfaces.mesh_charts import MeshCharts
 from dmpcli.surfaces.plane import PlaneCharts
+from dmpcli.surfaces.strip_inverse import Nearest
 from dmpcli.surfaces.strip_settling import Course
 from dmpcli.surfaces.surface import Charts, Status
 from dmpcli.surfaces.tangential import NEAR, Sought, solved
@@ -120,7 +121,12 @@ def invert(charts: Charts, position: Floats) -> Inverse:
     return result
 
 
-def on_strips(charts: MeshCharts, position: Floats, course: Course | None = None) -> Inverse:
+def on_strips(
+    charts: MeshCharts,
+    position: Floats,
+    course: Course | None = None,
+    nearest: Nearest | None = None,
+) -> Inverse:
     """Find coordinates as `invert` does, of the strokes that are found on strips alone.
 
     If they are one skill's they may have one course: see `strip_inverse.found`.
@@ -130,15 +136,23 @@ def on_strips(charts: MeshCharts, position: Floats, course: Course | None = None
     if len(rows) == 0 or shape[1] == 0:
         return _of_strips(_nothing(shape[1]), shape)
     every = len(rows) == len(position)
-    whole = _whole(charts if every else charts.rows(rows), position[rows], course)
-    if len(whole.rows) == len(position):
+    if not every:
+        charts, position = charts.rows(rows), position[rows]
+        nearest = nearest and (nearest[0][rows], nearest[1][rows])
+    whole = _whole(charts, position, course, nearest)
+    if len(whole.rows) == shape[0]:
         return _all_of_strips(whole)
     return _of_strips(replace(whole, rows=rows[whole.rows]), shape)
 
 
-def _whole(charts: MeshCharts, given: Floats, course: Course | None = None) -> strip_inverse.Found:
+def _whole(
+    charts: MeshCharts,
+    given: Floats,
+    course: Course | None = None,
+    nearest: Nearest | None = None,
+) -> strip_inverse.Found:
     """Strokes that are found on strips, and stay on one turn about the part."""
-    whole = strip_inverse.found(charts, given, course)
+    whole = strip_inverse.found(charts, given, course, nearest)
     return whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
 
 

@@ -4,7 +4,7 @@ A strip that was walked over a step, or facets that were walked on either side o
 come out whole and be wrong. None of these checks knows how the stroke was drawn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -51,6 +51,12 @@ class Feet:
     stretch: Floats
     outside: Booleans
 
+    def rows(self, rows: Integers, count: int) -> "Feet":
+        """Return some of so many strokes, which are no copies where these are all."""
+        if len(rows) == count:
+            return self
+        return Feet(*(getattr(self, field.name)[rows] for field in fields(self)))
+
 
 def refusals(
     mesh: TriangleMesh, feet: Feet, start: Floats, goal: Floats, goals: Floats
@@ -82,6 +88,22 @@ def refusals(
     ]
     which, what = [mark for mark, _ in wrong], [np.int64(status) for _, status in wrong]
     return np.select(which, what, np.int64(Status.DRAWN))
+
+
+def surely_sound(
+    mesh: TriangleMesh, feet: Feet, start: Floats, goal: Floats, goals: Floats
+) -> Booleans:
+    """Tell which strokes are surely not refused, shape (B,): by kernels, most of them.
+
+    Parameters are those of `refusals`.
+    """
+    from dmpcli.surfaces.kernels import checks
+
+    limits = checks.CheckLimits(_TIMES, _MORE, _ON, float(_TILTED), _SAME, MET)
+    values = feet.coordinates, feet.position, feet.normal, feet.face, feet.stretch, feet.outside
+    arrays = (np.ascontiguousarray(some) for some in (*values, start, goal, goals))
+    known = mesh.for_kernels
+    return checks.sound(known.facets.reals, known.rows, checks.CheckedStrokes(*arrays), limits)
 
 
 def unsound(mesh: TriangleMesh, feet: Feet) -> Booleans:

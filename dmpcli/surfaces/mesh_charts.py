@@ -147,6 +147,10 @@ class MeshCharts:
         # A stroke that is torn at a corner goes backwards there too, which is no fold.
         looked = (Status.DRAWN, Status.BORDER, Status.FOLDED)
         rows = rows[np.isin(status[rows], looked)]
+        if self.mesh.compiled and len(rows):
+            ends = self.centre.origin[rows], self.target[rows], self.goals[rows]
+            some = feet.rows(rows, len(self))
+            rows = rows[~last_check.surely_sound(self.mesh, some, *ends)]
         status[rows] = first_refusal(self._checked(rows, feet), status[rows])
 
     def _walk_facets(
@@ -208,9 +212,7 @@ class MeshCharts:
 
     def _some(self, rows: Integers, feet: last_check.Feet) -> last_check.Feet:
         """Return some of the strokes, with their facets."""
-        some = feet
-        if len(rows) < len(self):
-            some = last_check.Feet(*(getattr(feet, field.name)[rows] for field in fields(feet)))
+        some = feet.rows(rows, len(self))
         unknown = np.flatnonzero(some.face[:, 0] < 0)
         if len(unknown):
             walked = some.position[unknown]

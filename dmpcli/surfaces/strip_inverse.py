@@ -64,7 +64,16 @@ class Found:
         return Found(self.rows[which], self.coordinates[which], self.axes[which], self.miss[which])
 
 
-def found(charts: MeshCharts, position: Floats, course: Course | None = None) -> Found:
+Nearest = tuple[Floats, Integers]
+"""Closest points (B, T, 3) and their facets (B, T), as `TriangleMesh.closest_along` has them."""
+
+
+def found(
+    charts: MeshCharts,
+    position: Floats,
+    course: Course | None = None,
+    nearest: Nearest | None = None,
+) -> Found:
     """Find chart coordinates of strokes on the mesh or next to it; only of those found whole.
 
     Parameters
@@ -75,10 +84,14 @@ def found(charts: MeshCharts, position: Floats, course: Course | None = None) ->
     course : Course, optional
         Of strokes that one skill drew: kernels spare walks by it, and what they find of a stroke
         hangs on those that told it by rounding (1e-9 mm).
+    nearest : arrays, optional
+        Of the positions, where they are known: for kernels.
     """
     open_ = charts.lengths > 0.0
     rows = np.flatnonzero(open_ & ~charts.creased & (charts.status == Status.DRAWN))
-    foot, facet, height = _feet(charts.rows(rows), position[rows])
+    if nearest is not None:
+        nearest = nearest[0][rows], nearest[1][rows]
+    foot, facet, height = _feet(charts.rows(rows), position[rows], nearest)
     near = (np.abs(height) <= HIGHEST).all(axis=1) & np.isfinite(foot).all(axis=(1, 2))
     rows, foot, facet, height = rows[near], foot[near], facet[near], height[near]
     some = charts.rows(rows)
@@ -104,7 +117,9 @@ def found(charts: MeshCharts, position: Floats, course: Course | None = None) ->
     return Found(rows, coordinates, lift.axes, miss).rows_of(whole)
 
 
-def _feet(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]:
+def _feet(
+    charts: MeshCharts, position: Floats, nearest: Nearest | None = None
+) -> tuple[Floats, Floats, Floats]:
     """Feet (R, T, 3) by the smooth normal, normals of their facets, and heights (R, T), mm."""
     if not charts.mesh.compiled:
         return _feet_sought(charts, position)
@@ -115,7 +130,11 @@ def _feet(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, Floats]
     limits = inverse.FootLimits(_FEET, _ON_FOOT)
     position = np.ascontiguousarray(position)
     sign = charts.centre.sign
-    inverse.feet(charts.mesh.facets, position, sign, limits, foot, facet, height, doubt)
+    if nearest is None:
+        at, _, where = charts.mesh.closest_along(position)
+        nearest = at, where
+    facets = charts.mesh.facets
+    inverse.feet(facets, position, nearest, sign, limits, foot, facet, height, doubt)
     row, sample = np.nonzero(doubt)
     if len(row):
         some = _feet_sought(charts.rows(row), position[row, sample, None])

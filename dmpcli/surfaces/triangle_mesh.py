@@ -224,7 +224,7 @@ class TriangleMesh:
             return self._facets.search(points)
         from dmpcli.surfaces.kernels import tree
 
-        foot, face, doubt = tree.search(self.facets, np.ascontiguousarray(points, dtype=float))
+        foot, face, doubt = tree.search(self.facets, np.ascontiguousarray(points))
         if doubt.any():
             foot[doubt], face[doubt] = self._facets.search(points[doubt])
         return foot, face
@@ -263,20 +263,21 @@ class TriangleMesh:
         """Closest points, faces and normals of the last few points, by their bytes."""
         return {}
 
-    def closest_along(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Closest points of paths (B, T, 3), mm, and smooth normals there, both (B, T, 3)."""
-        if not self.compiled:
-            found = self.closest(paths)
-            return found.position, found.normal
+    def closest_along(self, paths: Floats) -> tuple[Floats, Floats, Integers]:
+        """Closest points of paths (B, T, 3), mm, and smooth normals there, both (B, T, 3).
+
+        And where their facets lie in the kernels' order, (B, T); with kernels alone.
+        """
         from dmpcli.surfaces.kernels import inverse
 
         foot, normal = np.empty((2, *paths.shape))
-        doubt = np.empty(paths.shape[:2], dtype=bool)
-        inverse.closest_along(self.facets, np.ascontiguousarray(paths), foot, normal, doubt)
+        row, doubt = np.empty(paths.shape[:2], dtype=np.int64), np.empty(paths.shape[:2], bool)
+        inverse.closest_along(self.facets, np.ascontiguousarray(paths), foot, normal, row, doubt)
         if doubt.any():
             found = self.closest(paths[doubt])
             foot[doubt], normal[doubt] = found.position, found.normal
-        return foot, normal
+            row[doubt] = self.for_kernels.rows[found.face]
+        return foot, normal, row
 
     def beyond_border(self, points: Floats, position: Floats, face: Integers) -> Booleans:
         """Tell which points (N, 3) lie beside the mesh rather than over it.

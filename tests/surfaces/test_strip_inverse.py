@@ -219,7 +219,7 @@ def test_kernels_find_the_closest_points_of_paths(bumpy):
     charts = laid(bumpy)
     path = charts.lift(wave(charts, height=2.0)).position
     for paths in (path, path + 3.0 * rng.normal(size=path.shape), 4.0 * path):
-        foot, normal = bumpy.with_kernels.closest_along(paths)
+        foot, normal, _ = bumpy.with_kernels.closest_along(paths)
         there = bumpy.closest(paths)
         apart = np.linalg.norm(paths - foot, axis=-1)
         np.testing.assert_allclose(apart, there.distance, atol=1e-9)

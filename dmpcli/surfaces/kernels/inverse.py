@@ -55,9 +55,14 @@ class NewtonLimits(NamedTuple):
 
 @kernel
 def closest_along(
-    facets: Facets, points: Floats, foot: Floats, normal: Floats, doubt: Booleans
+    facets: Facets,
+    points: Floats,
+    foot: Floats,
+    normal: Floats,
+    where: Integers,
+    doubt: Booleans,
 ) -> None:
-    """Fill in closest points of paths (B, T, 3), mm, and smooth normals there.
+    """Fill in closest points of paths (B, T, 3), mm, smooth normals there, and rows of facets.
 
     Where there is `doubt` numpy is to decide.
     """
@@ -71,7 +76,7 @@ def closest_along(
             else:
                 q, row = followed(facets, p, row, nodes, offs)
             doubt[b, k] = in_doubt(facets, p, q, row)
-            foot[b, k, 0], foot[b, k, 1], foot[b, k, 2] = q
+            foot[b, k, 0], foot[b, k, 1], foot[b, k, 2], where[b, k] = q[0], q[1], q[2], row
             n = smooth_normal(facets.reals, q, row)
             normal[b, k, 0], normal[b, k, 1], normal[b, k, 2] = n
 
@@ -89,6 +94,7 @@ def _on_edge(reals: Floats, foot: Vector, row: int) -> bool:
 def feet(
     facets: Facets,
     points: Floats,
+    near: tuple[Floats, Integers],
     sign: Floats,
     limits: FootLimits,
     foot: Floats,
@@ -98,19 +104,18 @@ def feet(
 ) -> None:
     """Fill in feet (B, T, 3) by the smooth normal, normals of their facets, and heights (B, T).
 
+    The search begins at the closest points that are `near`, (B, T, 3), and their rows, (B, T).
     Feet that are not found are no numbers. Samples with `doubt`, (B, T), are for numpy: those whose
     feet lie on an edge, where it matters which of its facets is named.
     """
     nodes, offs = stack()
     for b in range(len(points)):
-        row = -1
         for k in range(points.shape[1]):
             p = points[b, k, 0], points[b, k, 1], points[b, k, 2]
+            q, row = (near[0][b, k, 0], near[0][b, k, 1], near[0][b, k, 2]), near[1][b, k]
             below, up, unsure = p, 0.0, False
             for step in range(limits.most):
-                if row < 0:
-                    q, row = closest(facets, below, nodes, offs)
-                else:
+                if step > 0:
                     q, row = followed(facets, below, row, nodes, offs)
                 unsure |= _on_edge(facets.reals, q, row) or in_doubt(facets, below, q, row)
                 n = times(sign[b, 0], smooth_normal(facets.reals, q, row))

@@ -4,7 +4,7 @@ import numpy as np
 
 from dmpcli.spatial import rotations
 from dmpcli.spatial.kernels import euler_of_products
-from dmpcli.surfaces.kernels import facet_walks, samples, smoothing, stepping, tree
+from dmpcli.surfaces.kernels import checks, facet_walks, samples, smoothing, stepping, tree
 from dmpcli.surfaces.kernels.mesh import Geometry, compiled
 
 _ENTRIES = (
@@ -16,6 +16,7 @@ _ENTRIES = (
     stepping.ends,
     stepping.lines,
     samples.lift,
+    checks.sound,
     facet_walks.run,
     smoothing.smoothed,
     euler_of_products,
@@ -69,6 +70,8 @@ def load() -> None:
     )
     where = samples.SampleLimits(0.01, 0.05)
     samples.lift(facets, strip, flat, flat, one, number, where, feet)
+    checked = checks.CheckedStrokes(line, line, line, flat.astype(np.int64), flat, flags, v, v, v)
+    checks.sound(facets.reals, number, checked, checks.CheckLimits(3.0, 0.3, 1e-3, 0.9, 1e-6, 0.01))
     facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)
     frame = np.tile(np.eye(3), (1, 3, 1, 1))
     smoothing.smoothed(frame, np.zeros((1, 3, 3)), 1.0, 1, 0.1)

@@ -357,7 +357,7 @@ def nothing_else(facets: Facets, p: Vector, foot: Vector, nodes: Halves) -> bool
 
 @kernel
 def search(facets: Facets, points: Floats) -> tuple[Floats, Integers, Booleans]:
-    """Closest points (N, 3), mm, their faces (N,), and which are `in_doubt` (N,)."""
+    """Closest points (N, 3), mm, their faces (N,), and which are `in_doubt`."""
     nodes, offs = stack()
     feet, face = np.empty_like(points), np.empty(len(points), dtype=np.int64)
     doubt = np.empty(len(points), dtype=np.bool_)
