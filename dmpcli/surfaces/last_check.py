@@ -100,10 +100,20 @@ def surely_sound(
     from dmpcli.surfaces.kernels import checks
 
     limits = checks.CheckLimits(_TIMES, _MORE, _ON, float(_TILTED), _SAME, MET)
-    values = feet.coordinates, feet.position, feet.normal, feet.face, feet.stretch, feet.outside
-    arrays = (np.ascontiguousarray(some) for some in (*values, start, goal, goals))
+    whole = np.ascontiguousarray
+    strokes = checks.CheckedStrokes(
+        whole(feet.coordinates),
+        whole(feet.position),
+        whole(feet.normal),
+        whole(feet.face),
+        whole(feet.stretch),
+        whole(feet.outside),
+        whole(start),
+        whole(goal),
+        whole(goals),
+    )
     known = mesh.for_kernels
-    return checks.sound(known.facets.reals, known.rows, checks.CheckedStrokes(*arrays), limits)
+    return checks.sound(known.facets.reals, known.rows, strokes, limits)
 
 
 def unsound(mesh: TriangleMesh, feet: Feet) -> Booleans:

@@ -87,7 +87,8 @@ def settled(
         Their strips, by rows among the good ones.
     """
     count = len(foot)
-    at, good, walked = np.empty((*foot.shape[:2], 2)), np.zeros(count, dtype=bool), []
+    at, good = np.empty((*foot.shape[:2], 2)), np.zeros(count, dtype=bool)
+    walked: list[WalkedStrips] = []
 
     def seek(rows: Integers) -> None:
         some = charts.rows(rows), foot[rows], facet[rows], (ends[0][rows], ends[1][rows])
