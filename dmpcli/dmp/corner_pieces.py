@@ -40,7 +40,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Piece:
+class SmoothPiece:
     """What was fitted between two corners.
 
     Attributes
@@ -79,7 +79,7 @@ class Piece:
 
 def between(
     x: Floats, low: float, high: float, noise: Noise, variance: float, breaks: Floats
-) -> Piece | None:
+) -> SmoothPiece | None:
     """Fit the samples between two corners; None where nothing smooth explains them.
 
     Parameters
@@ -136,7 +136,7 @@ def explained(residual: Floats, noise: Noise) -> bool:
 
 def _polynomial(
     y: Floats, begin: int, low: float, high: float, noise: Noise, variance: float, at_end: bool
-) -> Piece | None:
+) -> SmoothPiece | None:
     from numpy.polynomial.legendre import legder, legval, legvander
 
     count = len(y)
@@ -170,10 +170,10 @@ def _piece(
     covariance: Floats,
     pulls: Floats,
     rests: tuple[bool, bool] | None,
-) -> Piece:
+) -> SmoothPiece:
     squares = float(np.sum((y - values) ** 2))
     two = (2, _JOINED)
-    return Piece(
+    return SmoothPiece(
         values,
         squares,
         size,
@@ -197,7 +197,7 @@ def _halved(design: Design | None, y: Floats, noise: Noise) -> Design | None:
     return None if halved is None else halved[0]
 
 
-def _spline(design: Design, y: Floats, variance: float, at_end: tuple[bool, bool]) -> Piece:
+def _spline(design: Design, y: Floats, variance: float, at_end: tuple[bool, bool]) -> SmoothPiece:
     c = design.coefficients(y)
     rests, size = [False, False], float(design.size)
     for i in range(2):
@@ -236,7 +236,7 @@ def _best(y: Floats, begin: int, low: float, high: float, variance: float) -> De
     return best
 
 
-def joint(before: Piece, after: Piece, variance: float) -> tuple[int, float]:
+def joint(before: SmoothPiece, after: SmoothPiece, variance: float) -> tuple[int, float]:
     """How smoothly two pieces meet: a corner is where the velocity jumps beyond its noise.
 
     Returns
@@ -269,12 +269,12 @@ def joint(before: Piece, after: Piece, variance: float) -> tuple[int, float]:
     return smooth, least
 
 
-def joined(pieces: list[Piece], smooth: list[int]) -> tuple[Floats, Floats]:
+def joined(pieces: list[SmoothPiece], smooth: list[int]) -> tuple[Floats, Floats]:
     """Values of pieces that meet, and what their velocity jumps by: shapes (T, D), (P, D).
 
     Parameters
     ----------
-    pieces : list of Piece
+    pieces : list of SmoothPiece
     smooth : list of int
         As `joint` tells.
     """

@@ -12,7 +12,7 @@ import numpy as np
 
 from dmpcli.arrays import Floats
 from dmpcli.dmp import corner_pieces, corner_search
-from dmpcli.dmp.corner_pieces import COST, Piece
+from dmpcli.dmp.corner_pieces import COST, SmoothPiece
 from dmpcli.dmp.corner_search import Candidate
 from dmpcli.dmp.least_squares import Design
 from dmpcli.dmp.noise import ROUNDING, Noise
@@ -71,7 +71,7 @@ def cornered(
     found = corner_search.candidates(x, noise, straight=False)
     if not found or (uniform and _dear(found, x, noise, variance, smooth)):
         return None
-    pieces = _Pieces(x, noise, variance, breaks)
+    pieces = _KeptPieces(x, noise, variance, breaks)
     at = corner_search.located(x, found, noise)
     more = []
     for low, high in zip(*pieces.edges(at), strict=True):
@@ -135,14 +135,14 @@ def _places(corners: int, x: Floats) -> float:
     return float(COST * (corners + ways) / axes)
 
 
-class _Pieces:
+class _KeptPieces:
     """Pieces by the corners between which they are, fitted once."""
 
     def __init__(self, x: Floats, noise: Noise, variance: float, breaks: Floats) -> None:
         self._x, self._noise, self._variance, self._breaks = x, noise, variance, breaks
-        self._kept: dict[tuple[float, float], Piece | None] = {}
+        self._kept: dict[tuple[float, float], SmoothPiece | None] = {}
 
-    def __getitem__(self, at: tuple[float, float]) -> Piece | None:
+    def __getitem__(self, at: tuple[float, float]) -> SmoothPiece | None:
         if at not in self._kept:
             self._kept[at] = corner_pieces.between(
                 self._x, *at, self._noise, self._variance, self._breaks
@@ -154,7 +154,7 @@ class _Pieces:
         inner: list[float] = at.tolist()
         return [0.0, *inner], [*inner, len(self._x) - 1.0]
 
-    def all(self, at: Floats) -> list[Piece] | None:
+    def all(self, at: Floats) -> list[SmoothPiece] | None:
         """Return the pieces between corners; None if there is one that nothing explains."""
         found = [self[edges] for edges in zip(*self.edges(at), strict=True)]
         pieces = [piece for piece in found if piece is not None]
