@@ -39,6 +39,8 @@ def polyline(seed, rate=100.0):
     return along(V, rng.uniform(20.0, 80.0), rate)
 
 
+@pytest.mark.sweep(kept=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_a_zigzag_is_as_near_at_its_corners_as_asked(sigma):
     t, truth = corners()
@@ -53,6 +55,8 @@ def test_a_zigzag_is_as_near_at_its_corners_as_asked(sigma):
     assert spline.corners >= 20
 
 
+@pytest.mark.sweep(kept=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [40.0, 100.0, 400.0])
 def test_any_polyline_is_kept_within_twice_its_noise(rate):
     for seed in range(300, 306):
@@ -64,6 +68,7 @@ def test_any_polyline_is_kept_within_twice_its_noise(rate):
         assert spline.corners >= 1
 
 
+@pytest.mark.thorough
 def test_what_is_smooth_between_corners_stays_smooth():
     """Letters, then a polyline: letters have no corner, and the polyline all of its own."""
     t, first = letters(6.0)
@@ -81,6 +86,7 @@ def test_what_is_smooth_between_corners_stays_smooth():
     assert peaks[0] <= 1.3 * peaks[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_smooth_strokes_have_no_corners(sigma):
     for t, truth in (six_seconds(), six_seconds(20.0), letters(8.0)):
@@ -88,6 +94,8 @@ def test_smooth_strokes_have_no_corners(sigma):
             assert smoothed(t, noisy(truth, sigma, seed)).corners == 0
 
 
+@pytest.mark.sweep(kept=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_a_stroke_that_stops_where_it_turns_is_not_kinked(sigma):
     """From rest to rest by five legs: it turns, but its velocity does not jump."""
@@ -102,6 +110,7 @@ def test_a_stroke_that_stops_where_it_turns_is_not_kinked(sigma):
         assert spline.rests == (True, True)
 
 
+@pytest.mark.slow
 def test_a_stroke_with_corners_moved_and_reversed_is_smoothed_alike():
     t, truth = polyline(7)
     points = noisy(truth, 0.1, 7)
