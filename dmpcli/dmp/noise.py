@@ -2,7 +2,9 @@
 
 The estimate rests on the upper half of the discrete cosine spectrum, where a hand does not reach.
 It is blind to noise that was filtered, interpolated or quantised on its way: such noise is
-recognised by a plateau that ends within the band, or by a lattice on which all samples lie.
+recognised by a plateau that ends within the band, or by a lattice on which all samples lie. A
+stroke's own detail, such as handwriting, may make a plateau too: it is believed to be noise only
+where it is small against the stroke, and present all along the recording.
 """
 
 from dataclasses import dataclass, replace
@@ -33,6 +35,12 @@ _SPREAD = 1.0
 # Decades by which the spectrum falls behind a plateau, and octaves within which it does.
 _FALL = 1.5
 _WITHIN = 2.0
+# Part of the extent above which the root mean square of a plateau is the stroke's own detail.
+_SMALL = 0.01
+# Halvings of the recording into windows, none of which noise leaves; degrees of freedom that a
+# window has at least, the part of the nominal ones that counts, as the plateau is only about level,
+# and the chance by which noise leaves any of them.
+_HALVINGS, _FREEDOM, _COUNTED, _LEFT = 7, 3.0, 0.75, 3e-3
 # First bin that the window's main lobe leaves free.
 _FIRST_BIN = 6
 # Quantisation coarser than this part of the extent is noise.
@@ -60,7 +68,9 @@ class Noise:
     kind : {'white', 'band', 'quantised', 'unknown'}
         Of too few samples it is not known, and σ is 0.
     reach : float or None
-        Frequency up to which noise of kind 'band' reaches, as part of half the sampling rate.
+        Frequency up to which noise of kind 'band' reaches, as part of half the sampling rate. Of
+        kind 'white', that up to which there may be such noise too, which is not told from the
+        stroke since parts of the recording are without it: it is not counted.
     stroke : float or None
         Frequency from which on the noise outweighs the stroke, likewise; a cut-off to name.
     step : float or None
@@ -73,6 +83,11 @@ class Noise:
     reach: float | None = None
     stroke: float | None = None
     step: float | None = None
+
+    @property
+    def doubted(self) -> bool:
+        """Whether there may be noise in a part of the band that is not counted."""
+        return self.kind == "white" and self.reach is not None
 
     @property
     def total(self) -> float:
@@ -96,7 +111,7 @@ class Noise:
         return replace(self, axes=axes, sigma=np.sqrt(np.maximum(variances, 0.0)))
 
 
-def estimate(x: Floats, partial: bool = True) -> Noise:
+def estimate(x: Floats, partial: bool = True, held: bool = False) -> Noise:
     """Estimate the noise of even samples.
 
     σ² is the median of the squared coefficients in the upper half of the orthonormal DCT-II of what
@@ -109,6 +124,8 @@ def estimate(x: Floats, partial: bool = True) -> Noise:
         Even in time.
     partial : bool
         Whether to look for noise that fills a part of the band, and for quantisation.
+    held : bool
+        Whether x may stand still but for its noise, as the orientation of a tool does.
 
     Returns
     -------
@@ -148,6 +165,11 @@ def estimate(x: Floats, partial: bool = True) -> Noise:
     if float(np.max(plateau)) < ROUNDING * extent:
         return Noise(axes, sigma)
     half = 0.5 * count
+    found = float(np.sum(plateau**2))
+    if not held and np.sqrt(found * (last - first) / half) > _SMALL * extent:
+        return Noise(axes, sigma)
+    if not _throughout(line, first, last, plateau):
+        return Noise(axes, sigma, reach=last / half, stroke=first / half)
     return Noise(plateau_axes, plateau, "band", reach=last / half, stroke=first / half)
 
 
@@ -237,6 +259,40 @@ def _plateau(centred: Floats) -> tuple[int, int, Floats] | None:
     rows = spectrum[edges[first] : edges[end]]
     rows = np.sqrt(2.0) * np.concatenate([rows.real, rows.imag])
     return int(edges[first]), int(edges[end]), rows
+
+
+def _throughout(rest: Floats, first: int, last: int, sigma: Floats) -> bool:
+    """Whether what lies between two bins of the spectrum is there all along the recording.
+
+    Noise has about the same level everywhere; letters end, and what follows them is without.
+
+    Parameters
+    ----------
+    rest : array, shape (T, D)
+    first, last : int
+    sigma : array, shape (D,)
+        By the plateau between the bins.
+    """
+    from scipy.special import chdtri
+
+    count = len(rest)
+    # Splines, unlike bands of the spectrum, do not ring across the recording.
+    band = least_squares.uniform(count, 2 * first).residual(rest)
+    if 4 * last < count:
+        band = band - least_squares.uniform(count, 2 * last).residual(rest)
+    sums = np.concatenate([[0.0], np.cumsum(np.einsum("td,td->t", band, band))])
+    variances = sigma**2
+    level = float(variances.sum()) * (last - first) / (0.5 * count)
+    alike = float(variances.sum()) ** 2 / float(np.sum(variances**2))
+    for halvings in range(1, _HALVINGS + 1):
+        window = count >> halvings
+        freedom = 2.0 * _COUNTED * alike * (last - first) * window / count
+        if freedom < _FREEDOM:
+            break
+        least = float(np.min(sums[window:] - sums[:-window])) / window
+        if least < level * float(chdtri(freedom, 1.0 - _LEFT / 2**halvings)) / freedom:
+            return False
+    return True
 
 
 def _level_stretch(level: list[float]) -> tuple[int, int] | None:

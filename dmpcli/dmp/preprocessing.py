@@ -184,12 +184,14 @@ def preprocess(
     if raw.rotation is not None:
         q = continuous_quaternions(raw.rotation)
         quaternion = spline_smoothing.smooth(
-            q, raw.duration, noise.estimate(q), cutoff, base.resampled
+            q, raw.duration, noise.estimate(q, held=True), cutoff, base.resampled
         )
     force = None
     if raw.contact_force is not None:
         f = raw.contact_force
-        force = spline_smoothing.smooth(f, raw.duration, noise.estimate(f), cutoff, base.resampled)
+        force = spline_smoothing.smooth(
+            f, raw.duration, noise.estimate(f, held=True), cutoff, base.resampled
+        )
     return Preprocessed(
         raw,
         position,

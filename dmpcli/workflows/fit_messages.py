@@ -173,6 +173,12 @@ def _of_recording(name: str, seen: "Preprocessed") -> Iterator[str]:
 
 def _of_noise(name: str, seen: "Preprocessed", skill: "Skill") -> Iterator[str]:
     noise = seen.position.noise
+    if noise.doubted:
+        yield (
+            f"{name}: what reaches up to {(noise.reach or 1.0) * seen.half_rate:.3g} Hz looks like "
+            "filtered noise in a part of the recording only, and is kept as the stroke's own; "
+            f"--cutoff {_round(seen)} smooths it"
+        )
     if skill.reached is None or noise.typical < _FAINT * skill.reached.tolerance:
         return
     if noise.kind == "quantised":

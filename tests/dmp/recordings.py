@@ -36,6 +36,22 @@ def letters(seconds=30.0, rate=100.0):
     return t, np.column_stack([12 * t + 7 * np.sin(a), y, 0 * t])
 
 
+def handwriting_and_lines(seed, glyphs=24, seconds=0.3, rate=100.0):
+    """Glyphs of about 16 mm, a curve through random points, then lines with corners at 50 mm/s."""
+    rng = np.random.default_rng(seed)
+    knots = rng.normal(0.0, 8.0, (glyphs, 3)) * [1, 1, 0]
+    knots[:, 0] += 4.0 * np.arange(glyphs)
+    t = times(seconds * (glyphs - 1), rate)
+    written = CubicSpline(seconds * np.arange(glyphs), knots)(t)
+    ways = np.array([[40, 0, 0], [0, -50, 0], [60, 30, 0], [-20, 60, 0], [90, 0, 0.0]])
+    V = written[-1] + np.r_[[[0.0, 0.0, 0.0]], np.cumsum(ways, axis=0)]
+    way = np.r_[0, np.cumsum(np.linalg.norm(np.diff(V, axis=0), axis=1))]
+    along = np.arange(50.0 / rate, way[-1], 50.0 / rate)
+    lines = np.column_stack([np.interp(along, way, c) for c in V.T])
+    points = np.concatenate([written, lines])
+    return np.arange(len(points)) / rate, points
+
+
 def corners():
     """A zigzag of 30 legs at 50 mm/s."""
     k = np.arange(31)

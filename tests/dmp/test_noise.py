@@ -11,6 +11,7 @@ from tests import human_strokes
 from tests.dmp.recordings import (
     corners,
     filtered,
+    handwriting_and_lines,
     interpolated,
     jerk,
     letters,
@@ -176,3 +177,50 @@ def test_a_lattice_is_told_wherever_the_stroke_lies():
     _, points = six_seconds()
     found = noise.estimate(np.round(points / 0.5) * 0.5 + [20000.0, 0.0, 0.0])
     assert (found.kind, found.step) == ("quantised", pytest.approx(0.5))
+
+
+@pytest.mark.parametrize("seed", [0, 15, 26])
+@pytest.mark.parametrize("sigma", [0.05, 0.5])
+def test_handwriting_before_straight_lines_is_no_noise(sigma, seed):
+    """Its spectrum is level up to some 2 Hz and falls behind, as that of filtered noise does."""
+    _, points = handwriting_and_lines(seed, glyphs=40)
+    found = noise.estimate(noisy(points, sigma, seed))
+    assert (found.kind, found.doubted) == ("white", False)
+    assert found.typical == pytest.approx(sigma, rel=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [50.0, 100.0, 250.0])
+@pytest.mark.parametrize("glyphs", [12, 24, 40, 80])
+def test_no_handwriting_is_noise_at_any_rate_however_much_there_is(glyphs, rate):
+    for seed in range(100, 110):
+        _, points = handwriting_and_lines(seed, glyphs, rate=rate)
+        for x in (points, points[::-1]):
+            assert noise.estimate(noisy(x, 0.15, seed)).kind == "white"
+
+
+@pytest.mark.parametrize("part", ["first", "last", "middle"])
+def test_what_ends_within_the_recording_is_not_counted_as_noise_but_doubted(part):
+    _, points = six_seconds()
+    moved = filtered(0.0 * points, 0.5, 3)
+    there = {"first": slice(0, 400), "last": slice(200, None), "middle": slice(100, 500)}[part]
+    x = noisy(points, 0.005, 1)
+    x[there] += moved[there]
+    found = noise.estimate(x)
+    assert found.kind == "white"
+    assert found.typical < 0.05
+
+
+def test_noise_of_a_held_tool_is_noise_however_little_else_moves():
+    still = np.zeros((601, 3))
+    assert noise.estimate(filtered(still, 0.01, 2), held=True).kind == "band"
+    assert noise.estimate(filtered(still, 0.01, 2)).kind == "white"
+
+
+def test_noise_of_a_part_of_the_band_is_throughout_where_every_window_has_it():
+    everywhere = filtered(np.zeros((601, 3)), 1.0, 5)
+    assert noise._throughout(everywhere, 15, 50, np.ones(3))
+    for gap in (slice(0, 200), slice(250, 400), slice(450, None)):
+        partly = everywhere.copy()
+        partly[gap] = 0.0
+        assert not noise._throughout(partly, 15, 50, np.ones(3))
