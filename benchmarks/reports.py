@@ -1,6 +1,6 @@
 """What `report` costs over a batch. ``python -m benchmarks.reports FOLDER [PLANE [MESH]]``.
 
-Batches of so many strokes (20,000 on a plane, 1,000 on 50,000 faces) are reported, and such of a
+Batches of so many strokes (10,000 on a plane, 400 on 50,000 faces) are reported, and such of a
 fifth of them, by kernels and by numpy in turn. Three things are told apart, in processor time:
 measuring alone, in one process, the best of three turns (reading the parts, figures of the strokes,
 lines of the CSV files); the whole command with two processes, of which what a stroke adds is the
@@ -9,6 +9,7 @@ reading the demonstration and the mesh, drawing the figures and the page. With i
 of all processes (proportional set sizes). Nothing is extrapolated. Some minutes.
 """
 
+import os
 import subprocess
 import sys
 import time
@@ -133,9 +134,13 @@ def commands(kinds: dict[str, tuple[str, int, Path | None]], place: Path) -> Non
 
 def main() -> None:
     """Print two Markdown tables."""
+    if "OPENBLAS_NUM_THREADS" not in os.environ:
+        # As the command line has it; the library reads it once, as it is loaded.
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
+        os.execv(sys.executable, [sys.executable, "-m", "benchmarks.reports", *sys.argv[1:]])
     place = Path(sys.argv[1])
     asked = [int(word) for word in sys.argv[2:4]]
-    plane, mesh = asked + [20_000, 1_000][len(asked) :]
+    plane, mesh = asked + [10_000, 400][len(asked) :]
     place.mkdir(parents=True, exist_ok=True)
     batches(place, plane, mesh)
     kinds: dict[str, tuple[str, int, Path | None]] = {

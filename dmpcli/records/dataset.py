@@ -152,53 +152,80 @@ def _table(folder: Location, source: Source) -> BatchFolder:
 
 
 def _decoded(folder: Location, source: Source) -> BatchFolder:
-    table = parquet.table(source)
-    provenance = _provenance(table.schema.metadata, schemas.PAIRS, source.name)
+    schema, columns = parquet.one_by_one(source)
+    provenance = _provenance(schema.metadata, schemas.PAIRS, source.name)
     named = schemas.PAIRS.columns
-    numbers = (*START, *GOAL, *NORMAL)
-    columns = columns_of(table, {n: named[n] for n in numbers}, source.name)
-    ids, status = (_text(table, name, named[name], source.name) for name in ("id", "status"))
-    part = np.full(len(ids), -1)
+    groups = (START, GOAL, NORMAL)
+    # Each column goes to its place before the next one is read: the table is never there whole.
+    place = {
+        name: (group, i)
+        for group, names in enumerate(groups)
+        for i, name in enumerate(names)
+        if set(names) <= set(schema.names)
+    }
+    numbers: dict[int, Floats] = {}
+    texts: dict[str, Any] = {}
+    part: Integers | None = None
     files: list[str] = []
-    if "part" in table.column_names:
-        words = _text(table, "part", named["part"], source.name).dictionary_encode()
-        names = [name or "" for name in words.dictionary.to_pylist()]
-        files = [name for name in names if name]
-        place = {name: i for i, name in enumerate(files)}
-        # Code -1, no value, takes the last one.
-        part = np.array([*(place.get(name, -1) for name in names), -1])[
-            np.asarray(words.indices.fill_null(-1))
-        ]
-    drawn = np.flatnonzero(part >= 0)
+    for table in columns:
+        name = table.column_names[0]
+        if name in ("id", "status"):
+            texts[name] = _text(table, name, named[name], source.name)
+        elif name == "part":
+            part, files = _parts(_text(table, name, named[name], source.name))
+        elif name in (*START, *GOAL, *NORMAL):
+            values = columns_of(table, {name: named[name]}, source.name, views=True)[name]
+            if name in place:
+                group, i = place[name]
+                numbers.setdefault(group, np.empty((len(values), 3)))[:, i] = values
+            del values
+        del table
+    for name in ("id", "status"):
+        if name not in texts:
+            raise _missing(name, schema.names, source.name)
+    ids = texts["id"]
+    if not len(ids):
+        raise InputError(f"{source.name}: holds no rows")
+    if part is None:
+        part = np.full(len(ids), -1)
     for name in files:
         file_io.part_in(folder, name, source.name)
-
-    def stacked(names: Sequence[str]) -> Floats | None:
-        if not all(name in columns for name in names):
-            return None
-        return np.column_stack([columns[name][drawn] for name in names])
-
-    return BatchFolder(
+    drawn = np.flatnonzero(part >= 0)
+    every = len(drawn) == len(ids)
+    if not every:
+        part = part[drawn]
+        numbers = {group: values[drawn] for group, values in numbers.items()}
+    found = BatchFolder(
         folder,
         source.sha256,
         provenance,
-        ids.take(pa.array(drawn)),
-        part[drawn],
-        stacked(START),
-        stacked(GOAL),
-        stacked(NORMAL),
+        ids if every else ids.take(pa.array(drawn)),
+        part,
+        *(numbers.get(group) for group in range(len(groups))),
         files,
-        status,
+        texts["status"],
         ids,
     )
+    # The library keeps what it is done with, and nothing as large is read again.
+    pa.default_memory_pool().release_unused()
+    return found
+
+
+def _parts(words: Any) -> tuple[Integers, list[str]]:
+    """Return the part of each pair by place among the names, -1 where there is none; the names."""
+    encoded = words.dictionary_encode()
+    names = [name or "" for name in encoded.dictionary.to_pylist()]
+    files = [name for name in names if name]
+    place = {name: i for i, name in enumerate(files)}
+    # Code -1, no value, takes the last one.
+    places = np.array([*(place.get(name, -1) for name in names), -1])
+    return places[np.asarray(encoded.indices.fill_null(-1))], files
 
 
 def _text(table: Any, name: str, column: Column, file: str) -> Any:
     """Return a text column as one Arrow array."""
     if name not in table.column_names:
-        raise InputError(
-            f"{file}: column {name!r} is missing; it has {', '.join(table.column_names)}"
-        )
+        raise _missing(name, table.column_names, file)
     try:
         values = table.column(name).cast(pa.string()).combine_chunks()
     except pa.ArrowException:
@@ -209,6 +236,10 @@ def _text(table: Any, name: str, column: Column, file: str) -> Any:
     if name == "id":
         check_ids(values, file)
     return values
+
+
+def _missing(name: str, names: Sequence[str], file: str) -> InputError:
+    return InputError(f"{file}: column {name!r} is missing; it has {', '.join(names)}")
 
 
 def _provenance(metadata: Any, expected: Schema, name: str) -> Provenance:
@@ -304,10 +335,12 @@ def surfaces_of(batch: BatchFolder) -> dict[str, str]:
     """Return SHA-256 of the surfaces that the table names, by what it calls them."""
     source = file_io.read_table(batch.folder)
     with untrusted.decoding(source.name):
-        table = parquet.table(source)
-        if not set(DRAWN_ON) <= set(table.column_names):
+        schema, columns = parquet.one_by_one(source)
+        if not set(DRAWN_ON) <= set(schema.names):
             return {}
-        names, hashes = (table.column(name).to_pylist() for name in DRAWN_ON)
+        found = {t.column_names[0]: t.column(0) for t in columns if t.column_names[0] in DRAWN_ON}
+        said = pa.table(found).group_by(list(DRAWN_ON), use_threads=False).aggregate([])
+        names, hashes = (said.column(name).to_pylist() for name in DRAWN_ON)
     return {name: sha256 for name, sha256 in zip(names, hashes, strict=True) if name and sha256}
 
 

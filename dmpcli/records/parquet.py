@@ -3,7 +3,7 @@
 Files that hold no checksums (of other programs, and of version 0.1.0) are read as they are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -22,6 +22,8 @@ _NUMBER, _TEXT = 8, 64
 
 _ROWS = 4096
 """Rows of lists that are read at once."""
+
+_REMEDY = "make it again"
 
 _FAULTS = (pa.ArrowException, OSError, ValueError, MemoryError)
 
@@ -93,13 +95,8 @@ def table(source: Source) -> Any:
     InputError
         As in `opened`; or two columns have one name.
     """
-    remedy = "make it again"
-    file = opened(source, remedy)
-    judge(source.name, file, len(source.content))
+    file = _whole(source)
     names = file.schema_arrow.names
-    double = twice(names)
-    if double is not None:
-        raise InputError(f"{source.name}: column {double!r} is there twice; leave one out")
     try:
         with untrusted.decoding(source.name):
             flat = [field.name for field in file.schema_arrow if not _nested(field.type)]
@@ -111,8 +108,48 @@ def table(source: Source) -> Any:
             return found
     except InputError as error:
         if isinstance(error.__cause__, _FAULTS):
-            raise damaged(source.name, remedy) from None
+            raise damaged(source.name, _REMEDY) from None
         raise
+
+
+def one_by_one(source: Source) -> tuple[Any, Iterator[Any]]:
+    """Read a table as `table` does, one column at a time: no more than one is in memory at once.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Of the file.
+    iterator of pyarrow.Table
+        Of one column each; lists and what else is nested are left out.
+
+    Raises
+    ------
+    InputError
+        As in `table`; of a damaged column as it is read.
+    """
+    file = _whole(source)
+    flat = [field.name for field in file.schema_arrow if not _nested(field.type)]
+    return file.schema_arrow, (_column(source, file, name) for name in flat)
+
+
+def _column(source: Source, file: Any, name: str) -> Any:
+    try:
+        with untrusted.decoding(source.name):
+            return _plain(source, file.read(columns=[name]))
+    except InputError as error:
+        if isinstance(error.__cause__, _FAULTS):
+            raise damaged(source.name, _REMEDY) from None
+        raise
+
+
+def _whole(source: Source) -> Any:
+    """Open a file of which all rows are read."""
+    file = opened(source, _REMEDY)
+    judge(source.name, file, len(source.content))
+    double = twice(file.schema_arrow.names)
+    if double is not None:
+        raise InputError(f"{source.name}: column {double!r} is there twice; leave one out")
+    return file
 
 
 def judge(name: str, file: Any, size: int, groups: Sequence[int] | None = None) -> None:
