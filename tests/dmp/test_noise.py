@@ -207,7 +207,7 @@ def test_what_ends_within_the_recording_is_not_counted_as_noise_but_doubted(part
     x = noisy(points, 0.005, 1)
     x[there] += moved[there]
     found = noise.estimate(x)
-    assert found.kind == "white"
+    assert (found.kind, found.doubted) == ("white", True)
     assert found.typical < 0.05
 
 
