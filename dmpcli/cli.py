@@ -54,7 +54,19 @@ class LazyCommand(TyperCommand):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> Any:
-        """Parse the words after the subcommand's name, by what its module declares."""
+        """Parse the words after the subcommand's name, by what its module declares.
+
+        Parameters
+        ----------
+        info_name : str or None
+            What usage lines call it.
+        args : list of str
+            The words; the parser takes them out.
+        parent : Context, optional
+            Of the program.
+        **extra
+            Settings of the context.
+        """
         name = str(self.name)
         made, words = _made(importlib.import_module(module_of(name)).command, name)
         words[:] = args
@@ -99,7 +111,18 @@ class Group(TyperGroup):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> Any:
-        """Parse the words, with help as wide as the terminal."""
+        """Parse the words, with help as wide as the terminal.
+
+        Parameters
+        ----------
+        info_name : str or None
+            What usage lines call the program.
+        args : list of str
+            The words; the parser takes them out.
+        parent : Context, optional
+        **extra
+            Settings of the context, the width of help among them.
+        """
         return super().make_context(
             info_name, args, parent, **{"max_content_width": width()} | extra
         )

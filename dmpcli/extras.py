@@ -131,7 +131,21 @@ def load(extra: Extra, option: str, *modules: str) -> list[Any]:
 
 
 def missing(extra: Extra, option: str, why: str) -> str:
-    """Say that an extra is not installed, and what to do."""
+    """Say that an extra is not installed, and what to do.
+
+    Parameters
+    ----------
+    extra : Extra
+    option : str
+        What needs it, as the command line says it: ``--cluster``.
+    why : str
+        What Python said as it looked for it.
+
+    Returns
+    -------
+    str
+        With where it can be had instead, where it has no wheel for this Python and machine.
+    """
     text = f"{option}: needs {extra.packages[0]}, which is not installed: {extra.install} ({why})"
     if extra.has_wheel(*here()):
         return text

@@ -84,7 +84,22 @@ class RowView:
         late: float,
         worst: float,
     ) -> dict[str, Any]:
-        """Return what `table` shows of a row; lateness in s."""
+        """Return what `table` shows of a row.
+
+        Parameters
+        ----------
+        numbers : sequence of float
+            Of all groups, one after the other: mm, s, N and N·m; rotations as nine of a matrix.
+        words : sequence of str
+            Its texts, in order.
+        late, worst : float
+            By how much the last cycle was late, and the latest so far, s.
+
+        Returns
+        -------
+        dict
+            Lateness in ms; wrench and contact only where the row has them.
+        """
         at: dict[str, list[float]] = {}
         first = 0
         for name, count in self.groups.items():

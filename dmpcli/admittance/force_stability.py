@@ -98,24 +98,61 @@ def _parts(delay: float, period: float, filter_: Filter) -> tuple[float, float]:
 
 
 def growth(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> float:
-    """Largest absolute eigenvalue of the loop; below 1 it comes to rest."""
+    """Largest absolute eigenvalue of the loop; below 1 it comes to rest.
+
+    Parameters
+    ----------
+    gains : ForceGains
+    stiffness : float
+        Of the contact, N/mm.
+    delay : float
+        s, as in `loop_matrix`.
+    tool : float
+        Mass on the sensor's tool side, N·s²/mm.
+    """
     return float(np.abs(np.linalg.eigvals(loop_matrix(gains, stiffness, delay, tool))).max())
 
 
 def is_stable(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> bool:
-    """Tell whether the force comes to rest in such a contact."""
+    """Tell whether the force comes to rest in such a contact.
+
+    Parameters
+    ----------
+    gains : ForceGains
+    stiffness, delay, tool : float
+        N/mm, s and N·s²/mm, as in `growth`.
+    """
     return growth(gains, stiffness, delay, tool) < 1.0
 
 
 def is_safe(gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0) -> bool:
-    """Tell whether it does with gains that answer quicker by `MARGIN`, too."""
+    """Tell whether it does with gains that answer quicker by `MARGIN`, too.
+
+    Parameters
+    ----------
+    gains : ForceGains
+    stiffness, delay, tool : float
+        N/mm, s and N·s²/mm, as in `growth`.
+    """
     return is_stable(gains.softened(1.0 / MARGIN), stiffness, delay, tool)
 
 
 def steadied(
     gains: ForceGains, stiffness: float, delay: float, tool: float = 0.0
 ) -> ForceGains | None:
-    """Return the gains, softened as far as such a contact needs it; None where nothing helps."""
+    """Return the gains, softened as far as such a contact needs it; None where nothing helps.
+
+    Parameters
+    ----------
+    gains : ForceGains
+    stiffness, delay, tool : float
+        N/mm, s and N·s²/mm, as in `growth`.
+
+    Returns
+    -------
+    ForceGains or None
+        The first that `is_safe`, each softer by a fifth than the one before.
+    """
     for _ in range(_SOFTENINGS):
         if is_safe(gains, stiffness, delay, tool):
             return gains

@@ -47,7 +47,17 @@ class Cut:
 
 
 def in_order(rows: Integers, size: int, first: int = 0) -> Cut:
-    """Cut rows of a table, by their numbers, into parts of so many, counted from the first one."""
+    """Cut rows of a table, by their numbers, into parts of so many, counted from the first one.
+
+    Parameters
+    ----------
+    rows : array of int, shape (B,)
+        Their numbers in the whole table, from 0, rising.
+    size : int
+        Rows of the whole table in a part; those that are left out here leave a part smaller.
+    first : int
+        Number of the part that these rows begin in.
+    """
     return Cut(rows // size - first)
 
 

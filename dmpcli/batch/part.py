@@ -166,6 +166,13 @@ class Outcome:
 def outcome_of(fact: Mapping[str, Any], rows: int, size: int) -> Outcome:
     """Return the outcome of a part that was drawn, from its own fact.
 
+    Parameters
+    ----------
+    fact : mapping
+        As JSON gave it.
+    rows, size : int
+        Rows and bytes of the part's file.
+
     Raises
     ------
     KeyError, TypeError, ValueError, AttributeError
@@ -216,7 +223,22 @@ class Settled:
 
 
 def settle(task: Task, ids: Sequence[str], strokes: Sequence[DrawnStroke]) -> list[Settled]:
-    """Return strokes of these ids as they are to be written, or why they cannot be drawn."""
+    """Return strokes of these ids as they are to be written, or why they cannot be drawn.
+
+    Parameters
+    ----------
+    task : Task
+        What is switched along each, and the arm that must reach them.
+    ids : sequence of str
+        Of each stroke.
+    strokes : sequence of DrawnStroke
+        Of any status.
+
+    Returns
+    -------
+    list of Settled
+        One for each.
+    """
     found = [_settled(task, name, stroke) for name, stroke in zip(ids, strokes, strict=True)]
     if task.events:
         found = [_switching(task, one) if one.status == OK else one for one in found]

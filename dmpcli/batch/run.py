@@ -179,6 +179,17 @@ class Batch:
     def draw(self, folder: Folder, draw: Draw, advance: Advance, summary: BatchSummary) -> None:
         """Draw what is not there yet.
 
+        Parameters
+        ----------
+        folder : Folder
+            Open.
+        draw : callable
+            Of `dmpcli.batch.workers`.
+        advance : Advance
+            Told how many pairs are done, and could not be drawn.
+        summary : BatchSummary
+            Added to.
+
         Raises
         ------
         RefusedError, InputError

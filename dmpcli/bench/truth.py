@@ -31,7 +31,21 @@ class Truth:
     def add(
         self, t: float, setpoint: int, tip: Sequence[float], force: Sequence[float], push: float
     ) -> None:
-        """Add a row; `tip` and `force` are of three."""
+        """Add a row.
+
+        Parameters
+        ----------
+        t : float
+            s.
+        setpoint : int
+            How many set-points had come.
+        tip : sequence of float, length 3
+            End of the pen, base frame, mm.
+        force : sequence of float, length 3
+            Of the workpiece on the pen, base axes, N.
+        push : float
+            Its part along the normal, N; 0 without contact.
+        """
         self._rows.extend((t, setpoint, *tip, *force, push))
 
     def columns(self) -> dict[str, Floats]:

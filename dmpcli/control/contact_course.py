@@ -115,7 +115,19 @@ class ContactCourse:
         return self._settled
 
     def fail(self, t: float, state: ContactState, why: str, urgent: bool = False) -> None:
-        """End it."""
+        """End it.
+
+        Parameters
+        ----------
+        t : float
+            s, of the event that is told.
+        state : str
+            What it ends in: ``lost``, ``too hard`` and so on.
+        why : str
+            For the user: what was found, and the remedy.
+        urgent : bool
+            Whether the run must end at once, not at leisure.
+        """
         self._become(state, t, why)
         self.failure, self.urgent = why, urgent
 

@@ -8,7 +8,17 @@ from dmpcli.planning.plan import Plan
 
 
 def setpoints(plan: Plan, setpoint: float, override: float | None) -> Floats:
-    """F_d at each set-point of a plan, shape (n,), N; an override leaves lifted parts at 0."""
+    """F_d at each set-point of a plan, shape (n,), N; an override leaves lifted parts at 0.
+
+    Parameters
+    ----------
+    plan : Plan
+        On the ways to its stroke and off it nothing is asked for.
+    setpoint : float
+        For a plan that brings no force of its own, N.
+    override : float or None
+        Instead of a plan's own force wherever that presses, N.
+    """
     wanted = np.zeros(len(plan))
     drawn = slice(plan.lead, plan.last + 1)
     if plan.force is None:

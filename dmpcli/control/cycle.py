@@ -86,8 +86,26 @@ class WrenchSource(Protocol):
     ) -> Floats | None:
         """Return the wrench on the tool, shape (6,), base axes; None where none is fresh enough.
 
-        InstrumentError where the sensor is silent, or sends what must not be believed; RefusedError
-        where the tool meets more than `force` or `torque`, N and N·m.
+        Parameters
+        ----------
+        state : RobotState
+            The actual pose turns the sensor's axes into the base's, and tells the tool's weight.
+        now : float
+            s, on the loop's clock.
+        force, torque : float
+            Largest that the tool may meet, N and N·m.
+
+        Returns
+        -------
+        array, shape (6,), or None
+            At the TCP, N and N·m.
+
+        Raises
+        ------
+        InstrumentError
+            The sensor is silent, or sends what must not be believed.
+        RefusedError
+            The tool meets more than `force` or `torque`.
         """
 
 

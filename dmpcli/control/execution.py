@@ -98,7 +98,21 @@ def prepare(
 
 
 def standing(stroke: StrokeTrajectory, settings: ExecuteSettings, state: RobotState) -> list[Check]:
-    """Check that the arm stands at a stroke's start."""
+    """Check that the arm stands at a stroke's start.
+
+    Parameters
+    ----------
+    stroke : StrokeTrajectory
+        Where it says no orientation, the arm's own is right.
+    settings : ExecuteSettings
+        Of which the tolerances of the start count, mm and rad.
+    state : RobotState
+
+    Returns
+    -------
+    list of Check
+        Distance and angle; failed ones too.
+    """
     goal = state.rotation if stroke.rotation is None else stroke.rotation[0]
     gap = state.pose.apart(Pose(stroke.position[0], goal))
     return preflight.near_start(*gap, settings.start_tolerance, settings.start_angle)

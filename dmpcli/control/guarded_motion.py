@@ -41,6 +41,20 @@ def towards(state: LawState, goal: float, speed: float, period: float) -> tuple[
 
 
 def sinking(state: LawState, speed: float, period: float) -> LawState:
-    """Go on towards the work at an even speed, mm/s."""
+    """Go on towards the work at an even speed, mm/s.
+
+    Parameters
+    ----------
+    state : LawState
+    speed : float
+        To which it speeds up, mm/s; a motion away from the work ends at once.
+    period : float
+        s.
+
+    Returns
+    -------
+    LawState
+        One period later; its integral is 0.
+    """
     v = min(speed, abs(min(state.speed, 0.0)) + _ACCELERATION * period)
     return LawState(state.e - v * period, -v)

@@ -157,7 +157,23 @@ class OutputSwitch:
 
 
 def failed(reason: str, failure: DmpError | None, left: str) -> tuple[str, DmpError | None]:
-    """Return how a run ended, with what may still be on."""
+    """Return how a run ended, with what may still be on.
+
+    Parameters
+    ----------
+    reason : str
+    failure : DmpError or None
+    left : str
+        Outputs that could not be switched off, in words; empty where there are none.
+
+    Returns
+    -------
+    str
+        Reason, with what is left.
+    DmpError or None
+        Of the same class, so of the same exit code; InstrumentError where the run itself did not
+        fail.
+    """
     if not left:
         return reason, failure
     text = f"{reason}; {left}"

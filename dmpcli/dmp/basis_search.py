@@ -251,7 +251,15 @@ class Problem:
 
 
 def judged(demonstrated: Floats, reproduced: Floats, closed: bool) -> Quality:
-    """Hold a reproduction (T, 6) against a demonstration at the same times (T, 6)."""
+    """Hold a reproduction against a demonstration at the same times.
+
+    Parameters
+    ----------
+    demonstrated, reproduced : array, shape (T, 6)
+        In the skill's coordinates, mm and rad.
+    closed : bool
+        Whether the stroke ends where it begins: then it has no wave height.
+    """
     near = nearest(demonstrated[:, :3], reproduced[:, :3])
     return Quality(
         float(np.sqrt(np.mean(near**2))),

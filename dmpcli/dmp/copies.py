@@ -12,7 +12,21 @@ _AT_ONCE = 10_000
 
 
 def copied(pairs: Pairs, count: int, spacing: float) -> Pairs:
-    """Return each pair `count` times, in turn, shifted by 0, 1, 2, ... times `spacing`, mm."""
+    """Return each pair `count` times, in turn, shifted by 0, 1, 2, ... times `spacing`, mm.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        B of them; their own shift, if they have one, is not kept.
+    count : int
+    spacing : float
+        Along v of each pair's chart, mm; it may be negative.
+
+    Returns
+    -------
+    Pairs
+        B times `count`; starts and goals are those of the pair, and the shift stands beside them.
+    """
 
     def repeated(values: Floats | None) -> Floats | None:
         return None if values is None else np.repeat(values, count, axis=0)

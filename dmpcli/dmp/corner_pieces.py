@@ -118,7 +118,23 @@ def between(
 
 
 def least(x: Floats, low: float, high: float, noise: Noise, variance: float) -> float:
-    """What the samples within [low, high] cost at least, in variances, of one polynomial."""
+    """What the samples within [low, high] cost at least, in variances, of one polynomial.
+
+    Parameters
+    ----------
+    x : array, shape (T, D)
+        The whole recording.
+    low, high : float
+        Times of two corners, in samples.
+    noise : Noise
+    variance : float
+        Of the noise, over all D.
+
+    Returns
+    -------
+    float
+        0 of fewer than `FEWEST` samples, infinite where no polynomial explains them.
+    """
     begin, end = int(np.ceil(low)), int(np.floor(high)) + 1
     if end - begin < FEWEST:
         return 0.0
@@ -238,6 +254,13 @@ def _best(y: Floats, begin: int, low: float, high: float, variance: float) -> De
 
 def joint(before: SmoothPiece, after: SmoothPiece, variance: float) -> tuple[int, float]:
     """How smoothly two pieces meet: a corner is where the velocity jumps beyond its noise.
+
+    Parameters
+    ----------
+    before, after : SmoothPiece
+        On either side of one corner.
+    variance : float
+        Of the noise, over all D.
 
     Returns
     -------

@@ -110,7 +110,18 @@ def _redraw(
 def seen_from(
     skill: Skill, style: GeneralizeOptions, pairs: Pairs, surface: Surface | None
 ) -> tuple[Skill, ContactHeights | None]:
-    """Return a skill and its heights as the pairs see them: turned over where all of them do."""
+    """Return a skill and its heights as the pairs see them: turned over where all of them do.
+
+    Parameters
+    ----------
+    skill : Skill
+    style : GeneralizeOptions
+        Has the heights of either side.
+    pairs : Pairs
+        In the base frame.
+    surface : Surface or None
+        Without one no pair sees a skill turned over.
+    """
     over = turned_over(skill, pairs, surface)
     if len(over) and over.all():
         return skill.turned_over(), style.heights_over

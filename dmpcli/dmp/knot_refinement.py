@@ -92,13 +92,39 @@ def refined(
 
 
 def cost(design: Design, c: Floats, x: Floats, variance: float) -> float:
-    """Mallows' Cp, in variances."""
+    """Mallows' Cp, in variances.
+
+    Parameters
+    ----------
+    design : Design
+    c : array, shape (design.size, D)
+        Its coefficients.
+    x : array, shape (T, D)
+        Samples.
+    variance : float
+        Of the noise, over all D.
+    """
     residual = x - design.values(c)
     return float(np.sum(residual**2)) / variance + _COST * design.size
 
 
 def halved(design: Design, c: Floats, x: Floats, noise: Noise) -> tuple[Design, Floats] | None:
-    """Halve intervals where sliding means of the residual are doubted; None if everywhere."""
+    """Halve intervals where sliding means of the residual are doubted; None if everywhere.
+
+    Parameters
+    ----------
+    design : Design
+    c : array, shape (design.size, D)
+        Its least-squares coefficients.
+    x : array, shape (T, D)
+        Samples.
+    noise : Noise
+
+    Returns
+    -------
+    (Design, array) or None
+        With coefficients fitted anew wherever intervals were halved; those given, where none was.
+    """
     for i in range(_HALVINGS):
         doubted = _doubted(x - design.values(c), design, noise, x, i == 0)
         if not doubted.any():
@@ -231,7 +257,21 @@ def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats, first: b
 
 
 def squares(residual: Floats, sigma: float, windows: tuple[int, ...]) -> Floats:
-    """χ² of sliding means of residuals (n, D) at their middles, and of peaks, (W + 1, n)."""
+    """χ² of sliding means of residuals at their middles, and of peaks.
+
+    Parameters
+    ----------
+    residual : array, shape (n, D)
+    sigma : float
+        Of the noise on each axis, in the unit of the residual.
+    windows : tuple of int
+        W of them, in samples, rising.
+
+    Returns
+    -------
+    array, shape (W + 1, n)
+        Of D degrees of freedom; 0 where a window does not fit. The peaks stand last.
+    """
     return _squares(residual, sigma, 0.0, windows, len(residual))
 
 

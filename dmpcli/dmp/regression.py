@@ -63,7 +63,17 @@ def lwr(basis: Basis, s: Floats, xi: Floats, forcing: Floats) -> Floats:
 
 
 def ridge(basis: Basis, s: Floats, xi: Floats, forcing: Floats) -> Floats:
-    """Least squares of all weights together, with a slight ridge; parameters as in `lwr`.
+    """Least squares of all weights together, with a slight ridge.
+
+    Parameters
+    ----------
+    basis : Basis
+        N functions.
+    s : array, shape (T,)
+        Phase of the samples.
+    xi : array, shape (T,)
+        As in `lwr`.
+    forcing : array, shape (T, D)
 
     Returns
     -------

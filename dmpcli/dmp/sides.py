@@ -16,6 +16,13 @@ _SAME_PLACE, _SAME_NORMAL = 0.05, 0.99
 def turned_over(skill: Skill, pairs: Pairs, surface: Surface | None) -> Booleans:
     """Tell at which pairs a surface is on the other side than was guessed for the skill.
 
+    Parameters
+    ----------
+    skill : Skill
+    pairs : Pairs
+        B of them, whose starts count; base frame, mm.
+    surface : Surface or None
+
     Returns
     -------
     array of bool, shape (B,)
@@ -35,12 +42,24 @@ def normals_at(surface: Surface, start: Floats) -> Floats:
 
 
 def taught_side(skill: Skill, surface: Surface, start: Floats) -> Floats | None:
-    """Vectors to the side that a skill was taught on, at starts (B, 3) or everywhere (3,).
+    """Vectors to the side that a skill was taught on, at starts or everywhere.
 
     The way its tool pointed, or without orientation the normal where it was taught; but on the very
     surface that it was taught on, that surface's side: about a cylinder, or on the other face of a
-    part, the tool's direction at the taught start may point out of the material. None where the
-    skill does not know its side.
+    part, the tool's direction at the taught start may point out of the material.
+
+    Parameters
+    ----------
+    skill : Skill
+    surface : Surface
+        That is to be drawn on.
+    start : array, shape (B, 3)
+        Base frame, mm.
+
+    Returns
+    -------
+    array, shape (B, 3) or (3,), or None
+        Base axes, of length 1; None where the skill does not know its side.
     """
     if skill.surface is not None:
         taught = surface.closest(skill.frame.start[None])

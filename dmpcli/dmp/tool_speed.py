@@ -82,7 +82,16 @@ def passed(stroke: Floats, position: Floats, pace: Pace, rate: float) -> Floats:
 
 
 def held(position: Floats, rate: float, speed: float) -> tuple[float, float]:
-    """How well a speed is held by samples (T, 3) at so many Hz.
+    """How well a speed is held by samples at so many Hz.
+
+    Parameters
+    ----------
+    position : array, shape (T, 3)
+        mm.
+    rate : float
+        Hz.
+    speed : float
+        That was asked for, mm/s.
 
     Returns
     -------

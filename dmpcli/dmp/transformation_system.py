@@ -119,6 +119,15 @@ def longest_step(spring: TransformationGains, duration: float, count: int) -> fl
 
     A third of the distance between two centres resolves the narrowest function; with few functions
     the spring is the faster of the two.
+
+    Parameters
+    ----------
+    spring : TransformationGains
+        Of its axes the fastest counts.
+    duration : float
+        Over which the centres are spread evenly, s.
+    count : int
+        N.
     """
     half = spring.d / 2.0
     fastest = half + np.sqrt(np.maximum(half**2 - spring.k, 0.0))

@@ -44,10 +44,25 @@ _FREE_TURN = 200.0
 def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
     """Return a program that draws all strokes; its file must have the program's name.
 
+    Parameters
+    ----------
+    motion : Motion
+        Poses in the base frame, which the program calls ``$ROBROOT``.
+    options : ProgramOptions
+        Tolerance, corners, ways to and from the work; with a tool also its TCP and, where its
+        weight is known, its load.
+    name : str
+        Of the main routine, as `identifier` spells it.
+
+    Returns
+    -------
+    bytes
+        Positions to 1e-4 mm, angles to 1e-5°; a part routine for each `options.lines` lines.
+
     Raises
     ------
     InputError
-        A stroke says no orientation.
+        A stroke says no orientation, or switches an output that is not ``DO`` and a number.
     """
     motion.rotation_needed("KRL")
     body: list[str] = []

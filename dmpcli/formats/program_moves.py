@@ -98,6 +98,17 @@ class ProgramMoves:
     ) -> None:
         """Take one move.
 
+        Parameters
+        ----------
+        line : int
+            Of the program, from 1; messages name it.
+        target : tuple of float
+            As it stands in the program; `strokes` makes poses of all targets together.
+        speed, turn : float
+            mm/s and rad/s; NaN where the move does not say it.
+        seconds : float
+            How long the move takes; NaN where it does not say it.
+
         Raises
         ------
         InputError
@@ -121,7 +132,15 @@ class ProgramMoves:
             self.move(line, self.targets[-1], seconds=seconds)
 
     def switch(self, output: str, on: bool, ahead: int = 0) -> None:
-        """Take an output that is switched where the last move has led, or one that is to come."""
+        """Take an output that is switched where the last move has led, or one that is to come.
+
+        Parameters
+        ----------
+        output : str
+        on : bool
+        ahead : int
+            How many moves on: 1 where a trigger stands before the move at whose end it acts.
+        """
         self.switches.append((len(self.targets) - 1 + ahead, output, on))
 
     def mark(self, comment: str) -> None:
@@ -244,10 +263,19 @@ def spelled(name: str) -> str:
 def output_number(name: str, letters: str, form: str) -> int:
     """Return the number of an output that a language names by number.
 
+    Parameters
+    ----------
+    name : str
+        As the stroke's events have it, such as ``DO3``.
+    letters : str
+        What the name must begin with.
+    form : str
+        What messages call the language.
+
     Raises
     ------
     InputError
-        Its name is not those letters and a number.
+        Its name is not those letters and a number of at most four digits.
     """
     found = re.fullmatch(rf"{letters}(\d{{1,4}})", name, re.ASCII)
     if found is None:

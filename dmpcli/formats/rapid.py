@@ -39,6 +39,22 @@ _EXTERNAL = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
 def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
     """Return a module whose procedure ``main`` draws all strokes.
 
+    Parameters
+    ----------
+    motion : Motion
+        Poses in the base frame, which the program calls ``wobj0``.
+    options : ProgramOptions
+        Tolerance, corners, ways to and from the work; with a tool also its data, without one
+        the tool that is active on the controller.
+    name : str
+        Of the module, as `identifier` spells it.
+
+    Returns
+    -------
+    bytes
+        Positions to 1e-4 mm; a procedure for each `options.lines` lines. Where more than one
+        output is switched at a corner, the corner is not rounded.
+
     Raises
     ------
     InputError

@@ -148,7 +148,23 @@ class MessageReader:
         self._wrenches: dict[str, Series] = {}
 
     def take(self, topic: str, type_: str, message: Any) -> None:
-        """Take one message."""
+        """Take one message.
+
+        Parameters
+        ----------
+        topic : str
+            Names the series; of TF messages the child frames do.
+        type_ : str
+            In full, as ``geometry_msgs/msg/PoseStamped``; those that are not of `READ` are passed
+            over.
+        message : object
+            Deserialized, with its type's fields; lengths in m, forces in N.
+
+        Raises
+        ------
+        InputError
+            The topic holds more than `MOST` messages.
+        """
         if type_ == _TF:
             for one in message.transforms:
                 self._transform(one.child_frame_id, one)

@@ -158,7 +158,22 @@ def legs(path: Toolpath, blend: float) -> Iterator[ProgramLeg]:
 
 
 def toolpaths(motion: Motion, options: ProgramOptions, digits: int) -> list[Toolpath]:
-    """Return the strokes of a motion as moves, with positions of so many digits after the point."""
+    """Return the strokes of a motion as moves, with positions of so many digits after the point.
+
+    Parameters
+    ----------
+    motion : Motion
+    options : ProgramOptions
+        Samples are thinned to within its `tolerance`; ways to and from the work are its `lift` off
+        the ends, along the surface's normal, else against the tool's axis, else along base z.
+    digits : int
+        Of positions in mm. Rounded here, so that lengths are those of the printed moves.
+
+    Returns
+    -------
+    list of Toolpath
+        Samples at which something is switched are kept.
+    """
     paths = []
     for stroke in motion.strokes:
         one, corners = with_places(stroke)

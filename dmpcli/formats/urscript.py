@@ -43,10 +43,26 @@ DEFAULT_SPEED = 250.0
 def encode(motion: Motion, options: ProgramOptions, name: str) -> bytes:
     """Return a program that draws all strokes.
 
+    Parameters
+    ----------
+    motion : Motion
+        Poses in the base frame.
+    options : ProgramOptions
+        Tolerance, corners, ways to and from the work; with a tool also its TCP and, where its
+        weight is known, its payload.
+    name : str
+        Of the program's function, as `identifier` spells it.
+
+    Returns
+    -------
+    bytes
+        Poses in m and rad; a function within the program for each `options.lines` lines.
+
     Raises
     ------
     InputError
-        A stroke says no orientation.
+        A stroke says no orientation, or switches an output that is not one of the letters ``DO``,
+        ``CO`` or ``TO`` and a number.
     """
     motion.rotation_needed("URScript")
     body: list[str] = []

@@ -163,10 +163,23 @@ class PlanDriver(Protocol):
     """What a driver offers besides `ServoDriver` if its controller plays a whole plan by itself."""
 
     def upload(self, targets: Floats, period: float, meanwhile: Callable[[], None]) -> None:
-        """Hand over every set-point of a plan, shape (n, 6) or (n, 7), `period` s apart.
+        """Hand over every set-point of a plan, `period` s apart.
 
-        Nothing moves; RefusedError or InstrumentError where the controller does not take them.
-        `meanwhile` is called before each request; what it raises ends the upload.
+        Nothing moves.
+
+        Parameters
+        ----------
+        targets : array, shape (n, 6) or (n, 7)
+            Joint angles or poses as `ServoDriver.send` takes them, in the declared units.
+        period : float
+            s.
+        meanwhile : callable
+            Called before each request; what it raises ends the upload.
+
+        Raises
+        ------
+        RefusedError, InstrumentError
+            The controller does not take them.
         """
 
     def play(self) -> None:

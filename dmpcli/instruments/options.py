@@ -24,9 +24,20 @@ class Options:
     def number(self, key: str, default: float, low: float, high: float, unit: str) -> float:
         """Read a number between `low` and `high`.
 
+        Parameters
+        ----------
+        key : str
+        default : float
+            What an absent option means; it may lie beyond the bounds.
+        low, high : float
+            Both allowed, in `unit`.
+        unit : str
+            For the message; empty where there is none.
+
         Raises
         ------
         InputError
+            It is no number, or beyond a bound; names the option and the range.
         """
         text = self._text(key)
         if text is None:
@@ -61,9 +72,18 @@ class Options:
     def whole(self, key: str, default: int, low: int, high: int) -> int:
         """Read a whole number from `low` to `high`.
 
+        Parameters
+        ----------
+        key : str
+        default : int
+            What an absent option means; it may lie beyond the bounds.
+        low, high : int
+            Both allowed.
+
         Raises
         ------
         InputError
+            It is no whole number, or beyond a bound; names the option and the range.
         """
         text = self._text(key)
         if text is None:

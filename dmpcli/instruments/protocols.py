@@ -208,10 +208,22 @@ class PlanPlayer(Protocol):
     def upload(
         self, position: Floats, rotation: Floats, period: float, meanwhile: Callable[[], None]
     ) -> None:
-        """Hand over set-points `period` s apart, shape (n, 3) in mm and (n, 3, 3).
+        """Hand over set-points `period` s apart; nothing moves.
 
-        Nothing moves; RefusedError where the arm cannot run them. `meanwhile` is called again and
-        again, for it may take long, and must not call the robot; what it raises ends the upload.
+        Parameters
+        ----------
+        position, rotation : array, shape (n, 3) and (n, 3, 3)
+            Of the TCP in the base frame, mm.
+        period : float
+            s.
+        meanwhile : callable
+            Called again and again, for it may take long; it must not call the robot, and what it
+            raises ends the upload.
+
+        Raises
+        ------
+        RefusedError
+            The arm cannot run them.
         """
 
     def play(self) -> None:

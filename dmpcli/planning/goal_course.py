@@ -70,7 +70,22 @@ def first(plan: Plan, joints: Floats | None = None) -> GoalCourse:
 
 
 def slices(now: GoalCourse, index: float, filter_: GoalFilter) -> int:
-    """Cycles that judging the joints of a new course may take, from this set-point on."""
+    """Cycles that judging the joints of a new course may take, from this set-point on.
+
+    Parameters
+    ----------
+    now : GoalCourse
+        In force.
+    index : float
+        The set-point at which the arm is, counted in periods of the plan.
+    filter_ : GoalFilter
+        Its slower mode tells how far a moved goal may draw the plan out.
+
+    Returns
+    -------
+    int
+        At least 1; of `SLICE` set-points each.
+    """
     more = np.log(1e3 / SETTLED) * 2.0 * filter_.slowest / filter_.period
     return 1 + int((len(now.plan) - index + more) // SLICE)
 

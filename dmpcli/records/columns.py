@@ -26,12 +26,26 @@ def columns_of(
 ) -> dict[str, AnyArray]:
     """Return the wanted columns of a pyarrow table as arrays, checked.
 
-    With `views` those without nulls are not copied, and cannot be written to.
+    Parameters
+    ----------
+    table : Arrow table
+    wanted : mapping of str to Column
+        Of a schema; columns of the table that are not wanted are left alone.
+    name : str
+        What messages call the file.
+    views : bool
+        Columns without nulls are not copied then, and cannot be written to.
+
+    Returns
+    -------
+    dict of array, shape (rows,)
+        Optional columns that the table lacks are absent; nulls are NaN, in whole numbers -1.
 
     Raises
     ------
     InputError
-        A required column is missing, empty or null somewhere, or a value is not a finite number.
+        A required column is missing, empty or null somewhere, a value is not a finite number or
+        beyond `LARGEST`, an id holds a control character, or there are no rows.
     """
     columns: dict[str, AnyArray] = {}
     for key, column in wanted.items():

@@ -106,7 +106,20 @@ class Piece:
 
 
 def part_of(batch: BatchFolder, part: int, rows: Integers) -> BatchFolder:
-    """Return what a batch knows of one part alone, by its place in `files`, and its rows."""
+    """Return what a batch knows of one part alone, by its place in `files`, and its rows.
+
+    Parameters
+    ----------
+    batch : BatchFolder
+    part : int
+    rows : array of int, shape (n,)
+        Of the pairs in that part, as `rows_of_parts` has them.
+
+    Returns
+    -------
+    BatchFolder
+        With one part, and without the status of any pair.
+    """
     none = batch.status.slice(0, 0)
 
     def own(values: Floats | None) -> Floats | None:

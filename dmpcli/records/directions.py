@@ -11,10 +11,18 @@ from dmpcli.records.file_io import Source
 def near(source: Source, field: str, numbers: list[float]) -> Floats:
     """Return a point, shape (3,), mm.
 
+    Parameters
+    ----------
+    source : Source
+    field : str
+        What messages call the point: its name in the file.
+    numbers : list of float, length 3
+        Finite, in mm.
+
     Raises
     ------
     InputError
-        It is beyond `FARTHEST`.
+        It is beyond `FARTHEST` along some axis.
     """
     point = np.array(numbers, dtype=float)
     if np.abs(point).max() > FARTHEST:
@@ -25,10 +33,20 @@ def near(source: Source, field: str, numbers: list[float]) -> Floats:
 def unit(source: Source, field: str, numbers: list[float], purpose: str) -> Floats:
     """Return a direction of any length as a unit vector, shape (3,).
 
+    Parameters
+    ----------
+    source : Source
+    field : str
+        What messages call the direction: its name in the file.
+    numbers : list of float, length 3
+        Finite, in any unit.
+    purpose : str
+        What the direction must do, in the words of a message: ``point off the plane``.
+
     Raises
     ------
     InputError
-        It is zero; the message says what it must do, `purpose`.
+        It is zero.
     """
     direction = np.array(numbers, dtype=float)
     largest = np.abs(direction).max()

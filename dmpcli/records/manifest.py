@@ -47,7 +47,24 @@ class Manifest(JsonPart):
 def document(
     parts: Sequence[Entry], pairs: int, drawn: int, provenance: Provenance
 ) -> dict[str, Any]:
-    """Return the manifest of a batch as it stands in its file."""
+    """Return the manifest of a batch as it stands in its file.
+
+    Parameters
+    ----------
+    parts : sequence of Entry
+        In the order of the table.
+    pairs : int
+        Rows of the table.
+    drawn : int
+        Pairs that have a trajectory.
+    provenance : Provenance
+        Of which the program's version, options and inputs are written.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
     found = Manifest(
         tool=provenance.tool,
         options=provenance.options,

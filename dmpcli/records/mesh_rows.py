@@ -36,6 +36,15 @@ class Rows:
     def table(self, first: int, rows: int, columns: int, what: str) -> Floats:
         """Return the first numbers of some rows, shape (rows, columns).
 
+        Parameters
+        ----------
+        first, rows : int
+            From which row on, from 0, and how many.
+        columns : int
+            Rows may hold more numbers, which are not taken.
+        what : str
+            What messages call a row.
+
         Raises
         ------
         InputError
@@ -49,6 +58,15 @@ class Rows:
     def lists(self, first: int, rows: int, before: int, what: str) -> tuple[Integers, Integers]:
         """Return lists that stand in rows after `before` numbers, each after its own length.
 
+        Parameters
+        ----------
+        first, rows : int
+            From which row on, from 0, and how many.
+        before : int
+            Numbers of each row before its list's length.
+        what : str
+            What messages call a row.
+
         Returns
         -------
         tuple of array (k,), array (rows,)
@@ -57,7 +75,8 @@ class Rows:
         Raises
         ------
         InputError
-            Fewer rows, a row that is too short, or a number that is not whole; by its line.
+            Fewer rows, a row that is too short, a length below 0, or a number that is not whole; by
+            its line.
         """
         self._whole(first, rows, what)
         self._long_enough(first, rows, np.full(rows, before + 1), what)

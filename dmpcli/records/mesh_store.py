@@ -67,6 +67,14 @@ class MeshStore:
     ) -> Exact | tuple[MeshFile, Mesh]:
         """Read a surface and place it, as `surface.load`.
 
+        Parameters
+        ----------
+        source : Source
+        unit : {'mm', 'cm', 'm', 'in'}, optional
+            Of a mesh file's coordinates; without it mm.
+        pose : Pose, optional
+            Of the file's own frame in the base frame; without it, they are the same.
+
         Returns
         -------
         Plane, Cylinder, Sphere, or tuple of MeshFile and Mesh

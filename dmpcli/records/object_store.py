@@ -155,7 +155,21 @@ class ObjectPath:
     def open(
         self, mode: str = "r", encoding: str | None = None, errors: str | None = None
     ) -> io.BufferedReader | io.TextIOWrapper:
-        """Open it for reading, ``r`` or ``rb``; what is read is asked for piece by piece."""
+        """Open it for reading, ``r`` or ``rb``; what is read is asked for piece by piece.
+
+        Parameters
+        ----------
+        mode : {'r', 'rb'}
+        encoding, errors : str, optional
+            Of text, as `io.TextIOWrapper` takes them.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such object.
+        InputError, InstrumentError
+            The store refuses, or does not answer; while reading too.
+        """
         store, name = self._open_store()
         with _told(self):
             opened = store.open_input_file(name)

@@ -86,7 +86,24 @@ def encode(
     unit: str | None = None,
     runner_up: RunnerUp | None = None,
 ) -> bytes:
-    """Return a pose as the bytes of its JSON file."""
+    """Return a pose as the bytes of its JSON file.
+
+    Parameters
+    ----------
+    pose : Pose
+        Of the part's frame in the base frame, mm; its rotation is written as X-Y-Z Euler angles.
+    residuals : Residuals, optional
+        Of touched points, mm, where the pose comes of a registration; so do the other parts.
+    conditioning : Conditioning, optional
+    options : dict, optional
+        Those of the command that change the result; JSON values.
+    inputs : list of dict, optional
+        ``{"role": ..., "sha256": ...}`` of each input file.
+    unit : {'mm', 'cm', 'm', 'in'}, optional
+        Of the part's own file, so that it is read alike elsewhere.
+    runner_up : RunnerUp, optional
+        The pose that fits next best.
+    """
     document = PoseFile(
         position=pose.position.tolist(),
         rotation=rotations.to_euler(pose.rotation).tolist(),

@@ -132,6 +132,14 @@ def encode(record: Record, form: Form | None = None) -> bytes:
 def store(record: Record, sink: Any, form: Form | None = None) -> None:
     """Write the record as a Parquet file into a path or an open Arrow or Python file.
 
+    Parameters
+    ----------
+    record : Record
+    sink : str or file
+        A path is overwritten, and left cut short where writing fails: see `Draft` for whole files.
+    form : Form, optional
+        Without it double precision, compressed with zstd.
+
     Raises
     ------
     OSError

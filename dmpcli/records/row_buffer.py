@@ -96,7 +96,20 @@ class RowBuffer:
             taken += len(part)
 
     def whole(self, first: int, last: int, cut: slice = slice(None)) -> Floats:
-        """Rows `first` to `last`, all groups or a cut of them, as one array."""
+        """Rows `first` to `last`, all groups or a cut of them, as one array.
+
+        Parameters
+        ----------
+        first, last : int
+            From 0; `last` is the first that is not taken, and at most the length.
+        cut : slice
+            Of a row's numbers, groups one after the other.
+
+        Returns
+        -------
+        array, shape (last - first, numbers of the cut)
+            A copy: rows that are added later do not show in it.
+        """
         parts = [part[:, cut] for part in self._parts(first, last)]
         return np.concatenate([np.empty((0, self._width))[:, cut], *parts])
 
@@ -117,5 +130,15 @@ class RowBuffer:
         return self.numbers(name).reshape(-1, 3, 3)
 
     def words(self, name: str, first: int = 0, last: int | None = None) -> list[str]:
-        """Texts of one column, of the rows `first` to `last`."""
+        """Texts of one column, of the rows `first` to `last`.
+
+        Parameters
+        ----------
+        name : str
+            One of `texts`.
+        first : int
+            From 0.
+        last : int, optional
+            The first row that is not taken; without it, all that are whole.
+        """
         return self._texts[name][first : self._count if last is None else last]

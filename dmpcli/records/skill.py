@@ -179,7 +179,23 @@ class SkillFile(JsonPart):
 
 
 def encode(skill: Skill, reproduction: list[Reproduction], provenance: Provenance) -> bytes:
-    """Return a skill as the bytes of its JSON file; floats round-trip exactly."""
+    """Return a skill as the bytes of its JSON file; floats round-trip exactly.
+
+    Parameters
+    ----------
+    skill : Skill
+        In its own coordinates; of its task frame, in the base frame, the rotation becomes Euler
+        angles.
+    reproduction : list of Reproduction
+        How well it draws each of its demonstrations again.
+    provenance : Provenance
+        Of which the program's version, options and inputs are written.
+
+    Returns
+    -------
+    bytes
+        Of version 3 where there is a force profile, else of version 2.
+    """
     frame = skill.frame
     rotation = None if frame.rotation is None else rotations.to_euler(frame.rotation).tolist()
     force = skill.force

@@ -127,7 +127,21 @@ def beside(folder: Location, name: str) -> Location:
 
 
 def each(folder: Location, ask: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """Return what each of some files in a folder answers; a store is asked for many at once."""
+    """Return what each of some files in a folder answers; a store is asked for many at once.
+
+    Parameters
+    ----------
+    folder : Path or ObjectPath
+        Of this machine: one file after the other; in a store up to 16 at once.
+    ask : callable
+        Called with each item, in a store from several threads.
+    items : iterable
+
+    Returns
+    -------
+    list
+        In the order of the items; the first error that `ask` raises, in that order, is raised.
+    """
     if isinstance(folder, Path):
         return [ask(item) for item in items]
     from concurrent.futures import ThreadPoolExecutor

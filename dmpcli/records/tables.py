@@ -222,7 +222,17 @@ def _parquet(source: Source) -> Table:
 
 
 def of_arrow(name: str, table: Any, rows: Integers | None = None) -> Table:
-    """Return an Arrow table, or these rows of a file, as a `Table`."""
+    """Return an Arrow table, or these rows of a file, as a `Table`.
+
+    Parameters
+    ----------
+    name : str
+        What messages call the file.
+    table : Arrow table
+        Columns of lists of one length become a column for each element, ``name[0]`` and so on.
+    rows : array of int, shape (rows,), optional
+        Which rows of the file these are, from 0; without it, all.
+    """
     columns: dict[str, Any] = {}
     for column in table.column_names:
         columns |= list_columns.expanded(column, table.column(column).combine_chunks())
@@ -416,6 +426,15 @@ def _are_values(cells: Sequence[str]) -> bool:
 
 def named(given: Sequence[str], count: int, source: str) -> list[str]:
     """Return names for all columns, the given ones first.
+
+    Parameters
+    ----------
+    given : sequence of str
+        As ``--columns`` names them.
+    count : int
+        How many columns the file has; the rest are called ``column N``, from 1.
+    source : str
+        What messages call the file.
 
     Raises
     ------

@@ -63,7 +63,22 @@ def facts_of(
 def facts_of_stroke(
     stroke: DrawnStroke, rate: float, start: Floats, goal: Floats
 ) -> dict[str, Any]:
-    """Return what is so for one stroke alone: its tau, ends and plane."""
+    """Return what is so for one stroke alone: its tau, ends and plane.
+
+    Parameters
+    ----------
+    stroke : DrawnStroke
+        Its normal is a fact only where one holds for all samples.
+    rate : float
+        Samples a second, Hz.
+    start, goal : array, shape (3,)
+        As asked for, base frame, mm.
+
+    Returns
+    -------
+    dict
+        JSON values; tau and duration in s.
+    """
     facts = {
         "tau": stroke.timing.tau,
         "duration": float(stroke.timing.t[-1]),

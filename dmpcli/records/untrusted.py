@@ -83,9 +83,21 @@ def decoder(read: F) -> F:
 def judge_size(name: str, size: int, largest: int, what: str) -> None:
     """Refuse bytes that would take too much memory, before any is taken.
 
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    size : int
+        Bytes that it has.
+    largest : int
+        Bytes that are read at most.
+    what : str
+        What is to be read, for the message: ``a JSON file``.
+
     Raises
     ------
     InputError
+        `size` is above `largest`.
     """
     if size > largest:
         has = beside(size / MIB, largest / MIB, ".3g")

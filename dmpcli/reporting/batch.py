@@ -311,7 +311,21 @@ def _known(values: Floats) -> Floats:
 def histogram(
     values: Floats, low: float | None = None, high: float | None = None, bins: int = BINS
 ) -> Row | None:
-    """Counts of values (k,) in bins of equal width, over their own range; None without values."""
+    """Counts of values in bins of equal width, over their own range; None without values.
+
+    Parameters
+    ----------
+    values : array, shape (k,)
+        Finite, in any unit.
+    low, high : float, optional
+        Of the bins, instead of the values' own; what lies beyond is not counted.
+    bins : int
+
+    Returns
+    -------
+    dict or None
+        ``edges``, bins + 1 of them in the unit of the values, and ``counts``.
+    """
     if not len(values):
         return None
     low = float(values.min()) if low is None else low

@@ -62,7 +62,16 @@ def named(
 
 
 def name_of(stroke: ReportedStroke, moved: bool = False, height: bool = True) -> str:
-    """Return a stroke's name, what it is, and its wave height."""
+    """Return a stroke's name, what it is, and its wave height.
+
+    Parameters
+    ----------
+    stroke : ReportedStroke
+    moved : bool
+        Whether it is drawn elsewhere than where it was recorded, which is then said.
+    height : bool
+        Whether the wave height is said, mm, where there is one.
+    """
     what = STYLES[stroke.role].name
     if moved:
         what = f"{what}, moved here"

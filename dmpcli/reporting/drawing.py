@@ -82,7 +82,16 @@ class PlottedCurve:
 def curve_of(
     stroke: ReportedStroke, position: Floats | None = None, name: str | None = None
 ) -> PlottedCurve:
-    """Return a stroke as a curve; `position` draws it elsewhere, `name` calls it otherwise."""
+    """Return a stroke as a curve.
+
+    Parameters
+    ----------
+    stroke : ReportedStroke
+    position : array, shape (n, 3), optional
+        Where it is drawn instead, sample by sample, mm.
+    name : str, optional
+        What it is called instead; its wave height stands after either name.
+    """
     style = STYLES[stroke.role]
     wave = stroke.wave
     at = stroke.position if position is None else position
@@ -116,7 +125,16 @@ def page(width: float, height: float) -> Figure:
 def panel(
     figure: Figure, left: float, bottom: float, width: float, height: float, **more: Any
 ) -> Axes:
-    """Add axes at a place given in inches from the lower left corner."""
+    """Add axes at a place given in inches from the lower left corner.
+
+    Parameters
+    ----------
+    figure : Figure
+    left, bottom, width, height : float
+        Inch.
+    **more
+        As `Figure.add_axes` takes it.
+    """
     w, h = figure.get_size_inches()
     return figure.add_axes((left / w, bottom / h, width / w, height / h), **more)
 
@@ -133,7 +151,17 @@ def title(axes: Axes, text: str) -> None:
 
 
 def labels(axes: Axes, x: str = "", y: str = "") -> None:
-    """Write what the axes of a panel are, at places of our own for the same reason."""
+    """Write what the axes of a panel are, at places of our own.
+
+    To find places, matplotlib would lay out every tick.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where it stands in its figure already.
+    x, y : str
+        With units; nothing is written of an empty one.
+    """
     figure = axes.get_figure(root=True)
     assert figure is not None
     width, height = axes.get_position().size * figure.get_size_inches()
@@ -146,7 +174,17 @@ def labels(axes: Axes, x: str = "", y: str = "") -> None:
 
 
 def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle, t: Floats | None = None) -> None:
-    """Draw one line in its role's style; one of samples at times `t` stops at gaps."""
+    """Draw one line in its role's style; one of samples at times stops at gaps.
+
+    Parameters
+    ----------
+    axes : Axes
+    x, y : array, shape (n,)
+        In the units of the axes.
+    style : PlotStyle
+    t : array, shape (n,), optional
+        When the samples were taken, s.
+    """
     apart = np.zeros(len(x) - 1, dtype=bool) if t is None else gaps.gaps(t)
     gaps.line(
         axes, x, y, apart, color=style.color, ls=style.line, lw=style.width, zorder=style.order,
@@ -155,7 +193,15 @@ def draw(axes: Axes, x: Floats, y: Floats, style: PlotStyle, t: Floats | None = 
 
 
 def mark(axes: Axes, x: Floats, y: Floats, style: PlotStyle) -> None:
-    """Mark the ends of each wave height: peaks and troughs as this panel shows them."""
+    """Mark the ends of each wave height: peaks and troughs as this panel shows them.
+
+    Parameters
+    ----------
+    axes : Axes
+    x, y : array, shape (m,)
+        Peaks and troughs in turn, whichever comes first.
+    style : PlotStyle
+    """
     if len(y) == 0:
         return
     # Extrema alternate, so every second one is of a kind, whichever way the panel looks.
@@ -168,7 +214,18 @@ def mark(axes: Axes, x: Floats, y: Floats, style: PlotStyle) -> None:
 
 
 def number(axes: Axes, x: Floats, y: Floats, curve: PlottedCurve, share: float) -> None:
-    """Write a curve's number on it, at a share of its samples."""
+    """Write a curve's number on it, at a share of its samples.
+
+    Parameters
+    ----------
+    axes : Axes
+    x, y : array, shape (n,)
+        The curve in this panel.
+    curve : PlottedCurve
+        One without a number gets none.
+    share : float
+        0 at the start, 1 at the goal.
+    """
     if not curve.number:
         return
     i = round(share * (len(x) - 1))
@@ -184,7 +241,17 @@ def shares(count: int) -> list[float]:
 
 
 def heading(axes: Axes, x: Floats, y: Floats, style: PlotStyle, share: float = 0.9) -> None:
-    """Draw an arrowhead that says which way a curve runs."""
+    """Draw an arrowhead that says which way a curve runs.
+
+    Parameters
+    ----------
+    axes : Axes
+    x, y : array, shape (n,)
+        The curve in this panel; one of no length gets none.
+    style : PlotStyle
+    share : float
+        Of its length, where the arrow stands.
+    """
     # By the way along it: samples lie close together where the tool is slow.
     way = np.append(0.0, np.hypot(np.diff(x), np.diff(y)).cumsum())
     if way[-1] == 0.0:
@@ -201,7 +268,14 @@ def heading(axes: Axes, x: Floats, y: Floats, style: PlotStyle, share: float = 0
 
 
 def ends(axes: Axes, start: Floats, goal: Floats) -> None:
-    """Mark where strokes begin and where they end, points (2,)."""
+    """Mark where strokes begin and where they end.
+
+    Parameters
+    ----------
+    axes : Axes
+    start, goal : array, shape (2,) or (3,)
+        Of which the first two count, in the coordinates of the panel.
+    """
     axes.plot(*start[:2], zorder=35, **_START)
     axes.plot(*goal[:2], zorder=35, **_GOAL)
 
@@ -215,7 +289,15 @@ def key_of_ends() -> list[tuple[Line2D, str]]:
 
 
 def spanned(low: float, high: float, margin: float = 0.06) -> tuple[float, float]:
-    """Limits around values, at least `LEAST_SPAN` apart."""
+    """Limits around values, at least `LEAST_SPAN` apart.
+
+    Parameters
+    ----------
+    low, high : float
+        mm.
+    margin : float
+        Share of the span that is left free on either side.
+    """
     span = max((high - low) * (1.0 + 2.0 * margin), LEAST_SPAN)
     middle = 0.5 * (low + high)
     return middle - 0.5 * span, middle + 0.5 * span
@@ -227,7 +309,17 @@ def legend(
     columns: int,
     more: Sequence[tuple[Line2D, str]] = (),
 ) -> None:
-    """Put the legend along the lower edge, outside all axes."""
+    """Put the legend along the lower edge, outside all axes.
+
+    Parameters
+    ----------
+    figure : Figure
+    curves : sequence of PlottedCurve
+        Where one has wave heights their marks get an entry too.
+    columns : int
+    more : sequence of (Line2D, str)
+        Entries that are no curves, which stand last.
+    """
     lines = [Line2D([], [], color=c.style.color, ls=c.style.line, lw=c.style.width) for c in curves]
     names = [f"{c.number}   {c.name}" if c.number else c.name for c in curves]
     if _marked(curves):
@@ -242,7 +334,15 @@ def legend(
 
 
 def legend_rows(curves: Sequence[PlottedCurve], columns: int, more: int = 0) -> int:
-    """Rows that the legend takes, with so many entries that are no curves."""
+    """Rows that the legend takes, with so many entries that are no curves.
+
+    Parameters
+    ----------
+    curves : sequence of PlottedCurve
+    columns : int
+    more : int
+        As `legend` will get them, so that a page leaves `ROW` inch for each row.
+    """
     entries = len(curves) + (1 if _marked(curves) else 0) + more
     return -(-entries // columns)
 

@@ -105,7 +105,17 @@ class Shown:
     png: bool = False
 
     def saved(self, name: str, title: str, caption: str, figure: Figure) -> ReportFigure:
-        """Return a figure as its files."""
+        """Return a figure as its files.
+
+        Parameters
+        ----------
+        name : str
+            Of the files, without suffix.
+        title, caption : str
+            What it shows; how that was measured.
+        figure : Figure
+            Its axes are ruled here, so that nothing may be added to it afterwards.
+        """
         ruling.rule(figure)
         return ReportFigure(name, title, caption, drawing.saved(figure, self.png))
 

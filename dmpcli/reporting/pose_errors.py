@@ -61,7 +61,15 @@ class Compared:
 def compared(
     name: str, against: str, estimate: Trajectory, reference: Trajectory
 ) -> Compared | None:
-    """Pair two trajectories by time; None where fewer than two samples have a like."""
+    """Pair two trajectories by time; None where fewer than two samples have a like.
+
+    Parameters
+    ----------
+    name, against : str
+        What the report calls the estimate and the reference.
+    estimate, reference : Trajectory
+        mm and s, on one clock; they need not share samples.
+    """
     rows, others = pose_error.associate(reference.t, estimate.t)
     if len(rows) < 2:
         return None
@@ -78,7 +86,15 @@ def compared(
 
 
 def apart(name: str, against: str, estimate: Trajectory, reference: Trajectory) -> str:
-    """Say why two trajectories have no pair of poses."""
+    """Say why two trajectories have no pair of poses.
+
+    Parameters
+    ----------
+    name, against : str
+        What the report calls the estimate and the reference.
+    estimate, reference : Trajectory
+        Of which `compared` makes nothing.
+    """
     after = float(estimate.t[0] - reference.t[-1])
     before = float(reference.t[0] - estimate.t[-1])
     if max(after, before) > 0.0:

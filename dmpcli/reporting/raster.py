@@ -73,7 +73,21 @@ class Picture:
     depth: Floats
 
     def hides(self, camera: Camera, points: Floats, by: float) -> Booleans:
-        """Tell which points (n, 3) the surface hides, being nearer to the eye by more than `by`."""
+        """Tell which points the surface hides, being nearer to the eye by more than a bound.
+
+        Parameters
+        ----------
+        camera : Camera
+            The one of the picture.
+        points : array, shape (n, 3)
+            mm; of one beside the picture the nearest pixel tells.
+        by : float
+            mm, so that a stroke does not hide in the surface that it lies on.
+
+        Returns
+        -------
+        array of bool, shape (n,)
+        """
         at = camera.seen(points)
         h, w = self.depth.shape
         column = np.clip((at[:, 0] * camera.scale).astype(int), 0, w - 1)

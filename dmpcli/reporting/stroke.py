@@ -190,9 +190,25 @@ class ReportedStroke:
 def as_drawn(
     place: Floats, over: ContactHeights | None, size: float = 1.0, turn: float = 0.0
 ) -> Floats:
-    """Chart coordinates (n, 3) of a demonstration as a stroke was to have them.
+    """Chart coordinates of a demonstration as a stroke was to have them.
 
     Flat where it touches the surface; if closed, larger, and turned about the normal.
+
+    Parameters
+    ----------
+    place : array, shape (n, 3)
+        u, v, w, mm.
+    over : ContactHeights or None
+        What is drawn of its heights; None draws all of them.
+    size : float
+        Factor of u and v.
+    turn : float
+        From e_u towards e_v, rad.
+
+    Returns
+    -------
+    array, shape (n, 3)
+        mm.
     """
     if over is None and (size, turn) == (1.0, 0.0):
         return place
@@ -203,7 +219,16 @@ def as_drawn(
 
 
 def chart_axes(start: Floats, goal: Floats, normal: Floats, closed: bool) -> Floats:
-    """Axes (3, 3) of a stroke's chart as columns: along, across and off the plane of a normal."""
+    """Axes (3, 3) of a stroke's chart as columns: along, across and off the plane of a normal.
+
+    Parameters
+    ----------
+    start, goal : array, shape (3,)
+        mm; of a closed stroke they do not count.
+    normal : array, shape (3,)
+        On the tool's side, of any length.
+    closed : bool
+    """
     n = normal / np.linalg.norm(normal)
     if closed:
         return plane.closed_axes(n)

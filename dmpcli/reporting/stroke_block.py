@@ -56,7 +56,21 @@ class MeasuredBlock:
 
 
 def gathered(column: AnyArray, first: Integers, n: int) -> Floats:
-    """Samples of trajectories of n samples each, shape (k, n)."""
+    """Samples of trajectories of n samples each, shape (k, n).
+
+    Parameters
+    ----------
+    column : array, shape (rows,)
+        Of the file.
+    first : array of int, shape (k,)
+        Where each trajectory begins, rising.
+    n : int
+
+    Returns
+    -------
+    array, shape (k, n)
+        A view of the column where the trajectories follow one another.
+    """
     begin, end = int(first[0]), int(first[-1]) + n
     if end - begin == len(first) * n:
         return np.asarray(column[begin:end]).reshape(-1, n)

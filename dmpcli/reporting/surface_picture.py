@@ -54,6 +54,18 @@ def sheet(ground: ReportSurface, low: Floats, high: Floats) -> Floats:
     """Triangles of an exact surface that cover its part in the box: two of a plane.
 
     Of a cylinder and a sphere a chart's grid about the point nearest to the middle of the box.
+
+    Parameters
+    ----------
+    ground : ReportSurface
+        A plane, a cylinder or a sphere.
+    low, high : array, shape (3,)
+        Corners of the box, base frame, mm.
+
+    Returns
+    -------
+    array, shape (m, 3, 3)
+        Corners of triangles, mm; they may lie beyond the box.
     """
     surface, middle = ground.surface, 0.5 * (low + high)
     hit = surface.closest(middle)

@@ -74,7 +74,20 @@ def origins(
 ) -> dict[str, str]:
     """Return where each setting comes from, by name: an option, a file, a preset, the default.
 
-    The parameters and errors are those of `resolve`.
+    Parameters
+    ----------
+    kind : type
+        The settings model.
+    options : mapping
+        Command-line options by field name; None means not given.
+    preset : str, optional
+    config : Path, optional
+        As `resolve` takes them; of the two, the file counts.
+
+    Raises
+    ------
+    InputError
+        A file as in `resolve`; values are not judged here.
     """
     _, origin = _layered(kind, preset, config)
     found = {one.name: origin.get(one.name, "default") for one in settings_of(kind)}

@@ -43,6 +43,13 @@ def turned(a: Floats, before: Floats, after: Floats) -> Floats:
 
     For a tangent vector this is parallel transport along the great circle from one normal to the
     other. Undefined where the normals are opposite: the result is then finite but meaningless.
+
+    Parameters
+    ----------
+    a : array, shape (..., 3)
+        In any unit, which the result keeps.
+    before, after : array, shape (..., 3)
+        Of length 1, in the axes of `a`.
     """
     both = before + after
     scale = 2.0 / np.maximum(dot(both, both), 1e-12)

@@ -22,7 +22,24 @@ def start(
     sign: Floats,
     part: Integers,
 ) -> tuple[Front, Front]:
-    """Stand M walks at points of the mesh, and M that go the other way."""
+    """Stand M walks at points of the mesh, and M that go the other way.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        One that is `compiled`.
+    position, normal, direction : array, shape (M, 3)
+        On the mesh, mm; unit vectors, the normal on the side that the walks keep to.
+    step, sign : array, shape (M, 1)
+        mm; +1 or -1, which turns the mesh's normals to the walks' side.
+    part : array of int, shape (M,)
+        Component of the mesh.
+
+    Returns
+    -------
+    ahead, behind : Front
+        With the curvature on either side; they may be walked in place.
+    """
     from dmpcli.surfaces.kernels import stepping
 
     def front(way: float) -> Front:
@@ -45,7 +62,15 @@ def start(
 
 
 def walk(mesh: TriangleMesh, front: Front, steps: Integers) -> tuple[Booleans, Booleans, Integers]:
-    """Walk so many steps (M,) in place.
+    """Walk so many steps in place.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        One that is `compiled`.
+    front : Front
+        M walks; their position, direction and normal are overwritten, nothing else.
+    steps : array of int, shape (M,)
 
     Returns
     -------

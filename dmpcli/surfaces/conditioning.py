@@ -79,7 +79,22 @@ class PointConditioning:
 
 
 def conditioning_of(points: Floats, normals: Floats, touched: int) -> PointConditioning:
-    """Gains of rows of points and normals (k, 3) that came from this many touched points."""
+    """Gains of rows of points and normals (k, 3) that came from this many touched points.
+
+    Parameters
+    ----------
+    points : array, shape (k, 3)
+        Where the part was touched, base frame, mm; one may be there several times.
+    normals : array, shape (k, 3)
+        Unit normals of the part there, base axes.
+    touched : int
+        By which sums of squares are divided, however many rows there are.
+
+    Raises
+    ------
+    InputError
+        The points are all one.
+    """
     centre = points.mean(axis=0)
     arms = points - centre
     radius = radius_of(arms)

@@ -60,7 +60,21 @@ def smoothed(
 
 
 def smoothed_vectors(values: Floats, position: Floats, width: float = WIDTH) -> Floats:
-    """Values (B, T, C) smoothed along paths (B, T, 3), mm, as `smoothed` does it."""
+    """Values smoothed along paths by moving averages, three times over; not twiced.
+
+    Parameters
+    ----------
+    values : array, shape (B, T, C)
+        In any unit, each of C smoothed for itself.
+    position : array, shape (B, T, 3)
+        mm; tells the arc length, and stays as it is.
+    width : float
+        Standard deviation, mm; near the ends it narrows, so that the first and the last stay.
+
+    Returns
+    -------
+    array, shape (B, T, C)
+    """
     steps = length(np.diff(position, axis=1))[..., 0]
     arc = np.concatenate([np.zeros((len(values), 1)), np.cumsum(steps, axis=1)], axis=1)
     # Three averages over ± half-width a have the variance a².

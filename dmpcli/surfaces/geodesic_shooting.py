@@ -92,7 +92,16 @@ class Ends:
         return cls(a, b, c, sharp, off)
 
     def fill(self, rows: Integers, other: "Ends", which: Booleans) -> None:
-        """Put some rows of other ends into these."""
+        """Put some rows of other ends into these.
+
+        Parameters
+        ----------
+        rows : array of int, shape (k,)
+            Of these.
+        other : Ends
+        which : array of bool, shape (rows of `other`,)
+            True for k of them, in the order of `rows`.
+        """
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(other, field.name)[which]
 
@@ -157,6 +166,14 @@ def hit(mesh: TriangleMesh, aim: Aim, shot: Shot) -> tuple[Aim, Ends, Booleans]:
     (the Jacobi field), and the tangential miss in the length. Where that does not converge the
     best of a fan of headings is corrected instead; from facet to facet all headings are looked
     through (`geodesic_search`), so that what is not hit has no straight line to it.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    aim : Aim
+        B shots; their directions and lengths are where the search begins.
+    shot : callable
+        `by_steps` or `by_facets`.
 
     Returns
     -------

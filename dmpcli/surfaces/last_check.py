@@ -95,7 +95,14 @@ def surely_sound(
 ) -> Booleans:
     """Tell which strokes are surely not refused, shape (B,): by kernels, most of them.
 
-    Parameters are those of `refusals`.
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        One that is `compiled`.
+    feet : Feet
+        B strokes.
+    start, goal, goals : array, shape (B, 3)
+        mm, as in `refusals`, which has the last word about the others.
     """
     from dmpcli.surfaces.kernels import checks
 
@@ -134,7 +141,16 @@ def unsound(mesh: TriangleMesh, feet: Feet) -> Booleans:
 def shorter_than_chord(
     mesh: TriangleMesh, start: Floats, goal: Floats, lengths: Floats
 ) -> Booleans:
-    """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise."""
+    """Tell which lines (B,) from start to goal are shorter than any can be, but for the noise.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    start, goal : array, shape (B, 3)
+        On the mesh, mm; the estimated noise of the facets there is taken off their distance.
+    lengths : array, shape (B,)
+        Of the lines as found, mm.
+    """
     chord = length(goal - start)[:, 0]
     noise = mesh.noise_at(mesh.search(np.stack([start, goal]).reshape(-1, 3))[1])
     height = 6.0 * noise.reshape(2, -1).max(axis=0)

@@ -335,10 +335,19 @@ class Link:
 
 
 def connect(mesh: TriangleMesh, centre: Centre, goal: Floats, status: Integers) -> Link:
-    """Find the geodesics from the charts' starts to points (B, 3) of the mesh.
+    """Find the geodesics from the charts' starts to points of the mesh.
 
-    Stepped along the smooth normal; unfolded where that meets a crease or does not arrive. Pairs
-    of another status than DRAWN keep it.
+    Stepped along the smooth normal; unfolded where that meets a crease or does not arrive.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    centre : Centre
+        Its directions and steps do not count.
+    goal : array, shape (B, 3)
+        mm.
+    status : array of int, shape (B,)
+        Pairs of another one than DRAWN keep it; the others may come to COINCIDENT or NO_GEODESIC.
     """
     count = len(status)
     met = length(goal - centre.origin)[:, 0] < COINCIDENT

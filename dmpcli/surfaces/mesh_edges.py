@@ -81,7 +81,16 @@ class Edges:
 
 
 def corners_at(half: Integers, k: int, faces: int) -> Integers:
-    """Corner at the start (k = 1) or end (k = 2) of half edges, numbered as these are."""
+    """Corner at the start (k = 1) or end (k = 2) of half edges, numbered as these are.
+
+    Parameters
+    ----------
+    half : array of int
+        Half edges as in `Edges.half`, in an array of any shape, which the result has too.
+    k : {1, 2}
+    faces : int
+        How many there are.
+    """
     at = half + k * faces
     return np.where(at < 3 * faces, at, at - 3 * faces)
 

@@ -69,7 +69,13 @@ def cut(V: Floats, corners: Integers, counts: Integers) -> PolygonCut:
 
 
 def too_large(V: Floats, corners: Integers, counts: Integers) -> int | None:
-    """Return the first polygon that would take too long to cut; None if there is none."""
+    """Return the first polygon that would take too long to cut; None if there is none.
+
+    Parameters
+    ----------
+    V, corners, counts : array
+        As `cut` takes them. Convex polygons of any size are quick to cut.
+    """
     start = np.cumsum(counts) - counts
     for i in np.flatnonzero(counts > LARGEST).tolist():
         outline = corners[start[i] : start[i] + counts[i]][None]

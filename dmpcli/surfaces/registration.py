@@ -214,7 +214,20 @@ def _extreme(V: Floats) -> Floats:
 
 
 def starts_near(touched: Floats, rotation: Floats, position: Floats) -> Pose:
-    """Return starts about a rough pose, itself the first."""
+    """Return starts about a rough pose, itself the first.
+
+    Parameters
+    ----------
+    touched : array, shape (n, 3)
+        Base frame, mm; the others are turned about their middle.
+    rotation, position : array, shape (3, 3) and (3,)
+        The rough pose of the part in the base frame, mm.
+
+    Returns
+    -------
+    Pose
+        `STARTS` of them.
+    """
     centre = touched.mean(axis=0)
     return pose_search.near(rotation, position, centre, STARTS, START_SHIFT, START_TURN)
 

@@ -86,7 +86,28 @@ class WalkedCharts:
 def walk_samples(
     walk: Walk, origin: Floats, direction: Floats, sign: Floats, coordinates: Floats
 ) -> tuple[Floats, Floats, np.ndarray]:
-    """Positions (B, T, 3), axes (B, T, 3, 3) and arrival (B, T) of chart coordinates (B, T, 3)."""
+    """Positions, axes and arrival of chart coordinates.
+
+    Parameters
+    ----------
+    walk : callable
+        See `Surface.walk`.
+    origin, direction : array, shape (B, 3)
+        Starts on the surface, mm, and unit e_u there.
+    sign : array, shape (B, 1)
+        Turns the surface's normals to the tool's side.
+    coordinates : array, shape (B, T, 3)
+        u, v, w, mm.
+
+    Returns
+    -------
+    position : array, shape (B, T, 3)
+        w off the surface, mm.
+    axes : array, shape (B, T, 3, 3)
+        Columns e_u, e_v, n.
+    arrived : array of bool, shape (B, T)
+        Whether both walks stayed on the surface.
+    """
     shape = coordinates.shape
     spread = np.broadcast_to
     along = walk(

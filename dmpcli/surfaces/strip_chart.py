@@ -86,9 +86,17 @@ def lift(
     v: Floats,
     walked: Sequence[WalkedStrips] | None = None,
 ) -> Samples:
-    """Carry u, v (B, T), mm, to the mesh; pairs with grids of one shape go together.
+    """Carry u, v to the mesh; pairs with grids of one shape go together.
 
-    With `walked`, which has all pairs, nothing is walked again.
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    centre : Centre
+        Of B charts.
+    u, v : array, shape (B, T)
+        mm.
+    walked : sequence of WalkedStrips, optional
+        Of all pairs, each once, and wide enough for u, v; nothing is walked again then.
     """
     B, T = u.shape
     foot, e_v, normal = (np.empty((B, T, 3)) for _ in range(3))
@@ -116,7 +124,20 @@ def _alike(mesh: TriangleMesh, centre: Centre, u: Floats, v: Floats) -> Iterator
 
 
 def shapes(centre: Centre, u: Floats, v: Floats) -> Iterator[tuple[Integers, Grid, Floats]]:
-    """Rows of pairs with grids of one shape, that shape, and their steps across (R, 1), mm."""
+    """Rows of pairs with grids of one shape, that shape, and their steps across (R, 1), mm.
+
+    Parameters
+    ----------
+    centre : Centre
+        Of B charts.
+    u, v : array, shape (B, T)
+        mm; of each row only the least and the largest count.
+
+    Yields
+    ------
+    tuple of array of int (R,), Grid, array (R, 1)
+        At most `PAIRS_AT_ONCE` pairs at a time.
+    """
     found, cross_step = grids_of(centre, u, v)
     kinds, kind = np.unique(found, axis=0, return_inverse=True)
     for number, shape in enumerate(kinds):
@@ -133,7 +154,15 @@ def widths(v: Floats) -> Floats:
 
 
 def grids_of(centre: Centre, u: Floats, v: Floats) -> tuple[Integers, Floats]:
-    """`Grid` of each pair, shape (B, 4), for coordinates (B, T), mm, and steps across (B, 1)."""
+    """`Grid` of each pair, shape (B, 4), and steps across, shape (B, 1), mm.
+
+    Parameters
+    ----------
+    centre : Centre
+        Tells the steps along.
+    u, v : array, shape (B, T)
+        mm. Steps across are the longest up to `STEP` of which a whole number makes the width.
+    """
     width = widths(v)
     cross_step = width / np.ceil(width / STEP - 1e-6)
     return grids(u / centre.step, v / cross_step), cross_step

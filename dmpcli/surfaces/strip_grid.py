@@ -126,7 +126,16 @@ class CentreLines:
     def walked(
         cls, mesh: TriangleMesh, centre: Centre, behind: Integers, ahead: Integers
     ) -> "CentreLines":
-        """Walk so many nodes (B,) of each line."""
+        """Walk so many nodes of each line.
+
+        Parameters
+        ----------
+        mesh : TriangleMesh
+        centre : Centre
+            Of B charts; nodes are its `step` apart.
+        behind, ahead : array of int, shape (B,)
+            Nodes on either side of the start.
+        """
         zero = int(behind.max(initial=0))
         along = _Lines(len(behind), zero + int(ahead.max(initial=0)) + 1)
         along.set(zero, centre.origin, centre.direction, centre.normal)
@@ -171,8 +180,21 @@ def walk_nodes(
 ) -> Nodes:
     """Walk the centre line both ways, then the cross lines from its nodes, both ways.
 
-    Only the nodes that the cells with samples need are walked to; the others stay zero. Centre
-    lines that were `walked` before are not walked again.
+    Only the nodes that the cells with samples need are walked to; the others stay zero.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    centre : Centre
+        Of B charts.
+    grid : Grid
+        One for all of them.
+    cross_step : array, shape (B, 1)
+        From node to node across, mm.
+    cells : array of bool, shape (B, nu - 1, nv - 1)
+        Which cells have samples.
+    walked : CentreLines, optional
+        Of the same charts; where it reaches far enough no centre line is walked again.
     """
     B, nu, nv = len(centre.step), grid.behind + grid.ahead + 1, grid.right + grid.left + 1
     along = None if walked is None else walked.of(grid)

@@ -99,7 +99,15 @@ class Strip:
         return np.asarray(~(cells & ~self.cells).any(axis=(1, 2)))
 
     def same(self, extent: Floats, reach: Floats, same_width: float) -> Booleans:
-        """Tell which strokes would have the same nodes walked for them again, shape (R,)."""
+        """Tell which strokes would have the same nodes walked for them again, shape (R,).
+
+        Parameters
+        ----------
+        extent, reach : array, shape (R, 2, 2)
+            Least and largest u, v, mm: as they are now, and those that the strips were walked for.
+        same_width : float
+            By which the two widths may differ, mm.
+        """
         near = np.abs(_width(extent) - _width(reach)) < same_width
         grid = strip_chart.grids_of(self.centre, extent[..., 0], extent[..., 1])[0]
         return np.asarray((grid == dataclasses.astuple(self.grid)).all(axis=1) & near)
@@ -116,9 +124,21 @@ class Strip:
         return cell[..., 0], cell[..., 1], share[..., 0], share[..., 1]
 
     def moved(self, foot: Floats, facet: Floats, rough: bool) -> tuple[Floats, Booleans]:
-        """Coordinates over feet (R, T, 3) along the normals of their facets; which are at rest.
+        """Coordinates over feet along the normals of their facets; which are at rest.
 
-        `rough` ones need not be: their nodes will be others.
+        Parameters
+        ----------
+        foot, facet : array, shape (R, T, 3)
+            Feet, mm, and unit normals.
+        rough : bool
+            Whether the nodes will be others anyhow, so that it need not be exact; by kernels each
+            sample then begins where its neighbour leads.
+
+        Returns
+        -------
+        array, shape (R, T, 2)
+            u, v, mm.
+        array of bool, shape (R,)
         """
         if self.compiled:
             return self._moved_by_kernels(foot, facet, rough)

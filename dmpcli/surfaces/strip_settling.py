@@ -48,7 +48,17 @@ class Course:
         self.told = False
 
     def tell(self, at: Floats, lengths: Floats, good: bool) -> None:
-        """Look for it in coordinates (R, T, 2) in charts of lengths (R,), if they are good."""
+        """Look for it in coordinates in charts of some lengths, if they are good.
+
+        Parameters
+        ----------
+        at : array, shape (R, T, 2)
+            u, v, mm.
+        lengths : array, shape (R,)
+            From start to goal, mm.
+        good : bool
+            Whether all of them were found.
+        """
         self.told = True
         course = np.stack([at[..., 0] / lengths[:, None], at[..., 1]], axis=-1)
         apart = np.abs(course - course[0]).max(axis=(0, 1))

@@ -58,7 +58,15 @@ class Sought:
     def better(self, other: "Sought", free: Booleans, replace: bool = False) -> "Sought":
         """Return these with what another search found of the samples that it was free to move.
 
-        Where both found a foot, the nearer one is kept, unless `replace` is set.
+        Parameters
+        ----------
+        other : Sought
+            Of the same strokes.
+        free : array of bool, shape (B, T)
+            Samples that the other search was free to move; the rest stay.
+        replace : bool
+            Whether what the other found counts in any case; else the nearer foot, where both
+            found one.
         """
         take = free & other.good
         if not replace:

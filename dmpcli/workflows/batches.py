@@ -25,7 +25,21 @@ from dmpcli.workflows.process import SLOW, SPLIT
 
 
 def write(ready: Ready, output: Location, wanted: BatchOptions) -> None:
-    """Draw the batch into a folder and say what became of it."""
+    """Draw the batch into a folder and say what became of it.
+
+    Parameters
+    ----------
+    ready : Ready
+    output : Path or ObjectPath
+        The folder; parts of the same batch that are there already are not drawn anew.
+    wanted : BatchOptions
+        Among others which share of the pairs this process draws.
+
+    Raises
+    ------
+    InputError, RefusedError
+        As `draw_into`.
+    """
     summary = draw_into(ready, output, wanted)
     _tell(ready.table.name, output, Shard(*wanted.share), summary)
 
@@ -95,10 +109,19 @@ def write_pieces(
 def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> BatchSummary:
     """Draw the batch into a folder; return what was drawn.
 
+    Parameters
+    ----------
+    ready : Ready
+    output : Path or ObjectPath
+        The folder; parts of the same batch that are there already are not drawn anew.
+    wanted : BatchOptions
+
     Raises
     ------
     InputError
-        No pair can be drawn.
+        No pair can be drawn, or the folder cannot be written.
+    RefusedError
+        A pair that cannot be drawn ends all, where the order says so.
     """
     table = ready.table
     if not table.good.any():

@@ -29,9 +29,19 @@ NAME = "dmpcli_stroke"
 def check(output: str | Path, options: ExportOptions, given: dict[str, Any]) -> FileFormat:
     """Refuse an output that could not be written, and options that say nothing of its format.
 
+    Parameters
+    ----------
+    output : str or Path
+        Its suffix tells the format, where `options` names none; with `ID` in its name it is written
+        per stroke, and is not tried here.
+    options : ExportOptions
+    given : dict
+        Of the options, those that were named, by field name: a default says nothing.
+
     Raises
     ------
     InputError
+        The format is not known, an option is not of it, or the place cannot be written to.
     """
     chosen = registry.format_of(output, options.format)
     of_programs = ("thin", "blend", "lift", "travel_speed", "acceleration", "lines")

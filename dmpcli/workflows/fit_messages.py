@@ -33,7 +33,21 @@ _ROUGH = 0.05
 
 
 def summary(output: str, names: Sequence[str], result: "Fit") -> str:
-    """Return what a person wants to know of a fit, a line per demonstration."""
+    """Return what a person wants to know of a fit, a line per demonstration.
+
+    Parameters
+    ----------
+    output : str
+        What the skill's file is called.
+    names : sequence of str
+        What the demonstrations are called, in their order.
+    result : Fit
+
+    Returns
+    -------
+    str
+        Lines: the skill first, its force last.
+    """
     skill = result.skill
     kind = "closed" if skill.closed else f"start to goal {skill.frame.length:.3f} mm"
     passes = f", {skill.passes} passes of LWR" if skill.passes > 1 else ""

@@ -189,7 +189,21 @@ def asked_events(settings: GeneralizeSettings) -> tuple[AskedEvent, ...]:
 
 
 def check_asked(skill: Skill, table: PairTable, settings: GeneralizeSettings) -> None:
-    """Refuse what this skill cannot give, rather than pass over it."""
+    """Refuse what this skill cannot give, rather than pass over it.
+
+    Parameters
+    ----------
+    skill : Skill
+    table : PairTable
+        Whether it asks for tool orientations.
+    settings : GeneralizeSettings
+
+    Raises
+    ------
+    InputError
+        Orientations of a skill without; what the original model does not know; size and heading of
+        an open stroke; scaling of a closed one by its amplitude.
+    """
     asked = (table.pairs.start_rotation, table.pairs.goal_rotation)
     if not skill.oriented and any(rotation is not None for rotation in asked):
         raise InputError(
@@ -273,6 +287,19 @@ def objections(
 
 
 def durations(skill: Skill, asked: Floats, settings: GeneralizeSettings) -> Floats:
-    """Return how long strokes last without easing, s; NaN is asked for where nothing is."""
+    """Return how long strokes last without easing, s; NaN is asked for where nothing is.
+
+    Parameters
+    ----------
+    skill : Skill
+        Its own duration counts where neither pair nor settings name one.
+    asked : array, shape (B,)
+        By each pair, s, or NaN.
+    settings : GeneralizeSettings
+
+    Returns
+    -------
+    array, shape (B,)
+    """
     default = settings.duration or skill.duration
     return np.where(np.isnan(asked), default, asked)

@@ -24,7 +24,25 @@ ENDS = "--start and --goal"
 def one_pair(
     start: Point, goal: Point, start_orientation: Point | None, goal_orientation: Point | None
 ) -> "PairTable":
-    """Return a table of one pair."""
+    """Return a table of one pair.
+
+    Parameters
+    ----------
+    start, goal : tuple of 3 float
+        mm.
+    start_orientation, goal_orientation : tuple of 3 float, or None
+        X-Y-Z Euler angles, rad; more than a turn is doubted aloud.
+
+    Returns
+    -------
+    PairTable
+        Of the id ``1``, in the frame in which it was given; its duration is NaN.
+
+    Raises
+    ------
+    InputError
+        An angle is not finite, or beyond all sense; names the option.
+    """
     import numpy as np
 
     from dmpcli.dmp.rollout import Pairs
@@ -84,7 +102,24 @@ def in_base(table: "PairTable", read: "SurfaceInput | None") -> "PairTable":
 def where_instead(
     table: "PairTable", row: int, read: "SurfaceInput", in_part: bool
 ) -> Callable[[list[str]], str]:
-    """Return what says of ends of a pair that are off the surface where it is instead."""
+    """Return what says of ends of a pair that are off the surface where it is instead.
+
+    Parameters
+    ----------
+    table : PairTable
+        In the base frame.
+    row : int
+        Of the table, from 0.
+    read : SurfaceInput
+    in_part : bool
+        Whether the pairs were given in the surface's own axes; the answer is then in both.
+
+    Returns
+    -------
+    callable
+        From ``start`` and ``goal``, those that are off, to a remedy in words; it looks for the
+        nearest places, so it is called only where they are told.
+    """
     from dmpcli.workflows import off_surface
 
     def where(ends: list[str]) -> str:
@@ -99,6 +134,22 @@ def facing_tool(surface: "Surface", skill: "Skill", table: "PairTable", name: st
     """Turn a plane's normal to the tool's side, and say so where that flips it.
 
     A mesh learns where it will be asked for its shape.
+
+    Parameters
+    ----------
+    surface : Surface
+        In the base frame.
+    skill : Skill
+        Tells on which side its tool is, as far as the pairs do not.
+    table : PairTable
+        In the base frame; rows that cannot be drawn have no say.
+    name : str
+        What messages call the surface.
+
+    Returns
+    -------
+    Surface
+        The same one, but for a plane that is flipped.
     """
     from dmpcli.dmp.feasibility import sideways, tool_axis
     from dmpcli.messages import tell
@@ -124,6 +175,17 @@ def reach_of(
     inputs: list[dict[str, str]],
 ) -> "Reach | None":
     """Return the arm that is to draw; None where none is named.
+
+    Parameters
+    ----------
+    model : str or None
+        Name of a kinematic model.
+    tool : Path or None
+        Tool file, which tells where the flange is; without it the flange is taken as the TCP.
+    oriented : bool
+        Whether the strokes say how the tool is turned; else it is told what is taken instead.
+    options, inputs : dict and list of dict
+        Of the provenance: what is read here is added to them.
 
     Raises
     ------
@@ -162,7 +224,24 @@ def style_of(
     contact: float | None,
     offset: float,
 ) -> "GeneralizeOptions":
-    """Return the style with what is drawn of the skill's heights over a named surface."""
+    """Return the style with what is drawn of the skill's heights over a named surface.
+
+    Parameters
+    ----------
+    style : GeneralizeOptions
+    skill : Skill
+    given : Surface or None
+        Without one, and of skills of the original model or the paper's learning, the style stays.
+    contact : float or None
+        Heights below it count as contact, mm; None takes it from the recording's noise.
+    offset : float
+        By which the stroke is shifted along the normal, mm.
+
+    Returns
+    -------
+    GeneralizeOptions
+        With a second set of heights where the skill's side was guessed, in case it is turned over.
+    """
     from dataclasses import replace
 
     from dmpcli.dmp.contact_heights import contact_heights

@@ -89,7 +89,20 @@ def reason(
 def tell_of_surface(
     skill: "Skill", style: "GeneralizeOptions", given: "Surface", table: "PairTable", name: str
 ) -> None:
-    """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over."""
+    """Say how the stroke lies over the named surface: in contact, lifted, shifted, turned over.
+
+    Parameters
+    ----------
+    skill : Skill
+    style : GeneralizeOptions
+        With its heights, as `style_of` gives them.
+    given : Surface
+        In the base frame.
+    table : PairTable
+        In the base frame; rows that cannot be drawn have no say.
+    name : str
+        What messages call the surface.
+    """
     from dmpcli.dmp.sides import turned_over
     from dmpcli.messages import tell, warn
 
@@ -174,7 +187,19 @@ def _tell_of_taught_side(skill: "Skill", given: "Surface", start: "Floats", name
 
 
 def tell_of_stretch(verdict: "Feasibility", rows: "Integers", skill: "Skill", table: str) -> None:
-    """Warn of strokes whose start-goal distance is far from the demonstrated one."""
+    """Warn of strokes whose start-goal distance is far from the demonstrated one.
+
+    Parameters
+    ----------
+    verdict : Feasibility
+        Of the pairs that were judged.
+    rows : array of int, shape (k,)
+        Those of them that are drawn.
+    skill : Skill
+        A closed or nearly closed one is doubted from 1 % on.
+    table : str
+        What messages call the table.
+    """
     from dmpcli.dmp.feasibility import LONG_STRETCH, nearly_closed
     from dmpcli.messages import warn
 

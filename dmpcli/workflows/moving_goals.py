@@ -98,6 +98,22 @@ class MovingGoals:
     ) -> "GoalFollower | None":
         """Return what the loop asks each cycle.
 
+        Parameters
+        ----------
+        plan : Plan
+            Of the stroke whose goal moves.
+        settings : ExecuteSettings
+            Its limits hold of moved courses too.
+        reach : Reach or None
+            The arm whose joints are judged.
+        tell : callable
+            Told in words what becomes of each goal.
+
+        Returns
+        -------
+        GoalFollower or None
+            None where no goal moves, or nobody listens yet.
+
         Raises
         ------
         InputError

@@ -80,6 +80,15 @@ def check_skill(
 ) -> None:
     """Refuse what this skill, or this table of pairs, cannot give.
 
+    Parameters
+    ----------
+    settings : GeneralizeSettings
+    skill : Skill
+    table : PairTable
+        Whether it asks for tool orientations, or for durations.
+    keep_out : Path or None
+        File of lines that no stroke crosses, only whether there is one.
+
     Raises
     ------
     InputError
@@ -161,6 +170,20 @@ def process_style(
     inputs: list[dict[str, str]],
 ) -> "GeneralizeOptions":
     """Return the style with what the process asks for.
+
+    Parameters
+    ----------
+    style : GeneralizeOptions
+    settings : GeneralizeSettings
+        Inclination, speed and border margin, mm.
+    on_border : {'fail', 'clip', 'skip', 'split'}
+        What becomes of a stroke that meets a border.
+    surface : Surface or None
+        In the base frame.
+    keep_out : Path or None
+        File of closed lines on the surface, base axes, mm; only with a surface.
+    inputs : list of dict
+        Of the provenance; the file of lines is added to it.
 
     Raises
     ------
@@ -246,7 +269,16 @@ def _regions(
 def warn_of_speed(
     strokes: "Sequence[DrawnStroke]", ids: "Sequence[str]", style: "GeneralizeOptions"
 ) -> None:
-    """Warn of strokes that hold the speed that was asked for on a small part of their path only."""
+    """Warn of strokes that hold the speed that was asked for on a small part of their path only.
+
+    Parameters
+    ----------
+    strokes : sequence of DrawnStroke
+    ids : sequence of str
+        Of each; of a single one the message has no need.
+    style : GeneralizeOptions
+        Without a pace nothing is warned of.
+    """
     from dmpcli.batch.part import is_slow
     from dmpcli.dmp.tool_speed import held
 
@@ -261,7 +293,19 @@ def warn_of_speed(
 
 
 def pieces(strokes: "Sequence[DrawnStroke]", ids: "Sequence[str]", rate: float, split: bool) -> str:
-    """Return in words what several strokes of one file are: copies, pieces, or both."""
+    """Return in words what several strokes of one file are: copies, pieces, or both.
+
+    Parameters
+    ----------
+    strokes : sequence of DrawnStroke
+        At least one.
+    ids : sequence of str
+        Of each.
+    rate : float
+        Hz.
+    split : bool
+        Whether some are pieces of one that was split, which is told.
+    """
     if split:
         tell(SPLIT)
     poses = sum(len(stroke.position) for stroke in strokes)

@@ -9,6 +9,14 @@ from dmpcli.errors import InputError, beside
 def within(option: str, values: Sequence[float], largest: float) -> None:
     """Refuse NaN and infinity, which the option parser lets pass, and numbers beyond all sense.
 
+    Parameters
+    ----------
+    option : str
+        What messages call the numbers.
+    values : sequence of float
+    largest : float
+        Of their absolute values, in their unit.
+
     Raises
     ------
     InputError

@@ -180,6 +180,15 @@ def _check_tutored(said: Mapping[str, Any], simulated: bool) -> None:
 def check_output(output: str | None, repeatable: bool, force: bool) -> None:
     """Refuse an output that cannot be written, or that holds what cannot be recorded again.
 
+    Parameters
+    ----------
+    output : str or None
+        A file's name, or ``-``; None: the recording stays in memory.
+    repeatable : bool
+        Whether the same command records the same again, as in simulated time.
+    force : bool
+        Whether a file of that name may be lost.
+
     Raises
     ------
     InputError
@@ -198,7 +207,19 @@ def provenance_of(
     tool: Source | None,
     tutored: Reference | None,
 ) -> Provenance:
-    """Return what is known of the recording before it is made; of the stroke only by the tutor."""
+    """Return what is known of the recording before it is made; of the stroke only by the tutor.
+
+    Parameters
+    ----------
+    settings : RecordSettings
+    options : dict
+        Those that only the command knows: which instruments.
+    simulated : bool
+    tool : Source or None
+        Of the tool file.
+    tutored : Reference or None
+        What the simulated hand draws; without it the tutor's settings are left out.
+    """
     settled = settings.as_options()
     facts: dict[str, Any] = {"simulated": simulated}
     sources = [("tool", tool)]

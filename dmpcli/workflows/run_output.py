@@ -244,6 +244,14 @@ def kept_as(output: str, content: bytes, replaces: bool) -> str:
 def write_once(output: str, content: bytes, replaces: bool) -> None:
     """Write what cannot be made again, beside a file of that name that has appeared meanwhile.
 
+    Parameters
+    ----------
+    output : str
+        What it is to be called; ``-`` is standard output.
+    content : bytes
+    replaces : bool
+        Whether a file of that name may be replaced.
+
     Raises
     ------
     InputError

@@ -76,6 +76,13 @@ class SurfaceInput:
 def check_options(surface: "Location | None", pose: str | None, unit: str | None) -> None:
     """Refuse a pose or a unit of no surface.
 
+    Parameters
+    ----------
+    surface : str, Path or None
+        Whether one was named at all.
+    pose, unit : str or None
+        As they were given.
+
     Raises
     ------
     InputError

@@ -184,9 +184,17 @@ def boolean(value: Any) -> bool:
 def whole(value: Any, low: int, high: int) -> int:
     """Read a whole number between two bounds.
 
+    Parameters
+    ----------
+    value : object
+        As JSON gave it; ``true`` and ``1.0`` are no whole numbers.
+    low, high : int
+        Both allowed.
+
     Raises
     ------
     BadReplyError
+        It is another kind of value, or beyond a bound.
     """
     if type(value) is not int or not low <= value <= high:
         raise BadReplyError(f"is no whole number from {low} to {high}: {_short(value)}")
@@ -196,9 +204,19 @@ def whole(value: Any, low: int, high: int) -> int:
 def numbers(value: Any, counts: tuple[int, ...], largest: float) -> list[float]:
     """Read a list of finite numbers within ±`largest`; its length must be one of `counts`.
 
+    Parameters
+    ----------
+    value : object
+        As JSON gave it.
+    counts : tuple of int
+        The first is the one that a message names.
+    largest : float
+        In the unit of the reply: mm, degrees or rad.
+
     Raises
     ------
     BadReplyError
+        It is no list, of another length, or holds what is no number or beyond ±`largest`.
     """
     if not isinstance(value, list) or len(value) not in counts:
         raise BadReplyError(f"is no list of {counts[0]} numbers: {_short(value)}")

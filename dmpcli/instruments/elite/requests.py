@@ -37,6 +37,14 @@ class Requests:
     def yes(self, method: str, params: Params | None = None, patience: float | None = None) -> bool:
         """Return the result of a request for yes or no, which comes within `patience` s.
 
+        Parameters
+        ----------
+        method : str
+        params : dict, optional
+            As JSON, in the controller's units.
+        patience : float, optional
+            Without it the client's own.
+
         Raises
         ------
         RefusedError
@@ -48,7 +56,15 @@ class Requests:
             return replies.boolean(self._client.call(method, params, patience))
 
     def whole(self, method: str, low: int, high: int) -> int:
-        """Return the result of a request for a whole number."""
+        """Return the result of a request for a whole number.
+
+        Parameters
+        ----------
+        method : str
+            One without parameters.
+        low, high : int
+            A reply beyond them cannot be believed.
+        """
         with self._believing(method):
             return replies.whole(self._client.call(method), low, high)
 

@@ -105,9 +105,19 @@ class Box:
     def set(self, page: str, key: str, value: int, wait: float) -> None:
         """Change one setting, as in ``comm.cgi?comrdtrate=100``.
 
+        Parameters
+        ----------
+        page : str
+            Of the box's web server, without a slash before it.
+        key : str
+        value : int
+        wait : float
+            For the whole answer, s.
+
         Raises
         ------
         NoAnswerError
+            None in time, or an error status; a redirect is an answer.
         """
         self._get(f"/{page}?{key}={value}", time.monotonic() + wait)
 

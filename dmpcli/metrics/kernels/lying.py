@@ -44,9 +44,18 @@ def tilts(rx: Floats, ry: Floats, normal: Floats, most: Floats, mean: Floats) ->
 def over_plane(
     position: Floats, point: Floats, normal: Floats, sign: Floats, height: Floats, length: Floats
 ) -> None:
-    """Fill in heights (B, n) over a plane on the tool's side, and lengths (B,) of the feet, mm.
+    """Fill in heights over a plane on the tool's side, and lengths of the feet, mm.
 
-    Positions are (3, B, n), `sign` (B,).
+    Parameters
+    ----------
+    position : array, shape (3, B, n)
+        mm.
+    point, normal : array, shape (3,)
+        Of the plane, mm; of length 1.
+    sign : array, shape (B,)
+        Turns the normal to each stroke's side.
+    height, length : array, shape (B, n) and (B,)
+        Filled in, mm.
     """
     nx, ny, nz = normal[0], normal[1], normal[2]
     for b in range(position.shape[1]):
@@ -65,7 +74,15 @@ def over_plane(
 
 @kernel
 def spreads(height: Floats, off: Floats, most: Floats, rms: Floats) -> None:
-    """Fill in the largest and the RMS (B,) of what heights (B, n) differ by from those meant."""
+    """Fill in the largest and the RMS of what heights differ by from those meant.
+
+    Parameters
+    ----------
+    height, off : array, shape (B, n)
+        As drawn, and as meant, mm.
+    most, rms : array, shape (B,)
+        Filled in, mm.
+    """
     for b in range(len(height)):
         total, largest = 0.0, 0.0
         for i in range(height.shape[1]):
@@ -79,9 +96,16 @@ def spreads(height: Floats, off: Floats, most: Floats, rms: Floats) -> None:
 def over_feet(
     position: Floats, foot: Floats, normal: Floats, height: Floats, length: Floats
 ) -> None:
-    """Fill in signed heights (B, n) of positions (B, n, 3) over their feet, and path lengths (B,).
+    """Fill in signed heights of positions over their feet, and lengths of the feet's paths.
 
-    As `many_on_surface.heights` and `path_lengths`; feet and normals are (B, n, 3), mm.
+    As `many_on_surface.heights` and `path_lengths`.
+
+    Parameters
+    ----------
+    position, foot, normal : array, shape (B, n, 3)
+        mm; unit normals at the feet, which tell the sign.
+    height, length : array, shape (B, n) and (B,)
+        Filled in, mm; heights below 0 lie against the normal.
     """
     for b in range(len(position)):
         total = 0.0

@@ -215,10 +215,20 @@ def _nearest_corner(
 
 @kernel
 def heights_there(curve: Polyline, clear: Floats, uv: Floats, stretch: Floats, out: Floats) -> None:
-    """Fill in heights w (B, n) where a curve whose u is stretched passes nearest to u, v (2, B, n).
+    """Fill in heights w where a curve whose u is stretched passes nearest to u, v.
 
-    `clear`, shape (m,), is the least distance of each corner to those that are not next to it, seen
-    along w, mm.
+    Parameters
+    ----------
+    curve : Polyline
+        Of m corners.
+    clear : array, shape (m,)
+        Least distance of each corner to those that are not next to it, seen along w, mm.
+    uv : array, shape (2, B, n)
+        mm; neighbours are near to one another, or each costs a search of the whole tree.
+    stretch : array, shape (B,)
+        Factor of the curve's u, for each stroke.
+    out : array, shape (B, n)
+        Filled in, mm.
     """
     c, last = curve.corners, len(curve.corners) - 1
     stack = np.empty(64, dtype=np.int64)

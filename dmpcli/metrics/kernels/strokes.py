@@ -10,7 +10,22 @@ from dmpcli.compiled import kernel
 
 @kernel
 def charted(position: Floats, start: Floats, axes: Floats) -> Floats:
-    """u, v, w (3, B, n) of positions (3, B, n), mm, in charts: starts (B, 3), axes (B, 3, 3)."""
+    """u, v, w of positions in the charts of their strokes.
+
+    Parameters
+    ----------
+    position : array, shape (3, B, n)
+        Base frame, mm.
+    start : array, shape (B, 3)
+        Origins of the charts, mm.
+    axes : array, shape (B, 3, 3)
+        Columns e_u, e_v, n.
+
+    Returns
+    -------
+    array, shape (3, B, n)
+        mm.
+    """
     place = np.empty_like(position)
     for b in range(position.shape[1]):
         for k in range(3):
@@ -26,7 +41,17 @@ def charted(position: Floats, start: Floats, axes: Floats) -> Floats:
 
 @kernel
 def ways(dt: Floats, position: Floats, length: Floats, speed: Floats) -> None:
-    """Fill in lengths (B,), mm, and largest speeds (B,), mm/s, of strokes (3, B, n)."""
+    """Fill in lengths and largest speeds of strokes that share their times.
+
+    Parameters
+    ----------
+    dt : array, shape (n - 1,)
+        From sample to sample, above 0, s.
+    position : array, shape (3, B, n)
+        mm.
+    length, speed : array, shape (B,)
+        Filled in: mm and mm/s, the speeds those of whole steps.
+    """
     for b in range(position.shape[1]):
         total, fastest = 0.0, 0.0
         for i in range(len(dt)):

@@ -72,6 +72,16 @@ class LabParameters:
 def parked(arm: Arm, tool: Tool, tcp: Pose) -> Floats:
     """Joint angles, shape (6,), rad, that bring the TCP to a pose.
 
+    Of several branches it is the one nearest to the arm's ready posture.
+
+    Parameters
+    ----------
+    arm : Arm
+    tool : Tool
+        Tells where the flange is for the TCP.
+    tcp : Pose
+        In the base frame, mm.
+
     Raises
     ------
     RefusedError

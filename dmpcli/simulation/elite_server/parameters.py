@@ -49,9 +49,18 @@ class Params:
     def number(self, name: str, low: float, high: float, otherwise: float | None = None) -> float:
         """Return a number within a range; without `otherwise` it must be given.
 
+        Parameters
+        ----------
+        name : str
+        low, high : float
+            Both allowed, in the unit of the parameter.
+        otherwise : float, optional
+            What it means that it is absent; it must lie within the range too.
+
         Raises
         ------
         RpcError
+            ``BAD_PARAMS``: absent, no number, or out of range.
         """
         value = self._given.get(name, otherwise)
         if not _is_number(value) or not low <= value <= high:
@@ -61,9 +70,18 @@ class Params:
     def choice(self, name: str, choices: tuple[int, ...], otherwise: int | None = None) -> int:
         """Return a whole number out of some.
 
+        Parameters
+        ----------
+        name : str
+        choices : tuple of int
+            A number with a fraction of 0 is taken for a whole one.
+        otherwise : int, optional
+            What it means that it is absent; without it it must be given.
+
         Raises
         ------
         RpcError
+            ``BAD_PARAMS``: absent, no number, or none of them.
         """
         value = self._given.get(name, otherwise)
         if not _is_number(value) or value not in choices:
@@ -82,9 +100,18 @@ class Params:
     def pose(self, name: str, degrees: bool, euler: Euler) -> Pose:
         """Return a pose of a position in mm and three angles.
 
+        Parameters
+        ----------
+        name : str
+        degrees : bool
+            Whether the request's angles are in degrees; else in rad.
+        euler : {'xyz', 'zyx'}
+            What they mean, see `Euler`.
+
         Raises
         ------
         RpcError
+            ``BAD_PARAMS``: it is not six numbers.
         """
         row = self._row(name, (6,))
         angles = np.radians(row[3:]) if degrees else row[3:]
@@ -115,13 +142,35 @@ def angles(rotation: Floats, euler: Euler) -> Floats:
 
 
 def pose_row(position: Floats, rotation: Floats, euler: Euler, degrees: bool = False) -> Floats:
-    """Each pose as six numbers: mm, and rad or degrees; shape (..., 6)."""
+    """Each pose as six numbers: mm, and rad or degrees; shape (..., 6).
+
+    Parameters
+    ----------
+    position, rotation : array, shape (..., 3) and (..., 3, 3)
+        mm.
+    euler : {'xyz', 'zyx'}
+        Which angles, see `Euler`.
+    degrees : bool
+        Whether the angles are in degrees.
+    """
     turned = angles(rotation, euler)
     return np.concatenate([position, np.degrees(turned) if degrees else turned], axis=-1)
 
 
 def pose_numbers(position: Floats, rotation: Floats, euler: Euler) -> list[float]:
-    """`pose_row` of one pose in mm and rad, in plain floats: for what is sent every 8 ms."""
+    """`pose_row` of one pose in mm and rad, in plain floats: for what is sent every 8 ms.
+
+    Parameters
+    ----------
+    position, rotation : array, shape (3,) and (3, 3)
+        mm.
+    euler : {'xyz', 'zyx'}
+        Which angles, see `Euler`.
+
+    Returns
+    -------
+    list of float, length 6
+    """
     if euler == "xyz":
         return [*position.tolist(), *to_euler_one(rotation)]
     return [*position.tolist(), *(-angle for angle in to_euler_one(rotation.T))]

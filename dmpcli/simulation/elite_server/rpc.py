@@ -58,7 +58,16 @@ def answer(line: bytes, call: Call, newline: bool) -> bytes:
 
 
 def refusal(error: RpcError, number: Any, newline: bool) -> bytes:
-    """Return the bytes of an error reply."""
+    """Return the bytes of an error reply.
+
+    Parameters
+    ----------
+    error : RpcError
+    number : JSON value
+        Id of the request; None where it could not be read.
+    newline : bool
+        Whether the reply ends in a newline.
+    """
     told = {"code": error.code, "message": error.message}
     return _encoded({"jsonrpc": "2.0", "error": told, "id": number}, newline)
 

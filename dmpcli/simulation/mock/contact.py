@@ -20,7 +20,19 @@ class Hand(Protocol):
     def wrench(self, t: float, position: Floats, rotation: Floats, velocity: Floats) -> Floats:
         """Return the hand's wrench on the tool at the TCP, base axes, shape (6,).
 
-        `t` is the lab's clock, s; `velocity`, shape (6,), in mm/s and rad/s.
+        Parameters
+        ----------
+        t : float
+            The lab's clock, s.
+        position, rotation : array, shape (3,) and (3, 3)
+            Of the TCP in the base frame, mm.
+        velocity : array, shape (6,)
+            Of the TCP, base axes, mm/s and rad/s.
+
+        Returns
+        -------
+        array, shape (6,)
+            N and N·m.
         """
 
 

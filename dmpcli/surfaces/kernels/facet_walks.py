@@ -44,7 +44,25 @@ def run(
     remaining: Floats,
     most: int,
 ) -> Booleans:
-    """Walk lengths (M,), mm, in place, over no more than so many facets; tell which got there."""
+    """Walk lengths (M,), mm, in place, over no more than so many facets; tell which got there.
+
+    Parameters
+    ----------
+    reals, numbers : array
+        Of `Facets`.
+    position, heading : array, shape (M, 3)
+        On the mesh, mm, and unit vectors in the facets' planes; overwritten. A walk that meets a
+        border ends there.
+    rows : array of int, shape (M,)
+        Facets in the tree's order; overwritten.
+    remaining : array, shape (M,)
+        How far to walk, mm; read only.
+    most : int
+
+    Returns
+    -------
+    array of bool, shape (M,)
+    """
     arrived = np.zeros(len(remaining), dtype=np.bool_)
     for i in range(len(remaining)):
         p, d, row, left = at(position, i), at(heading, i), rows[i], remaining[i]

@@ -62,9 +62,19 @@ def closest_along(
     where: Integers,
     doubt: Booleans,
 ) -> None:
-    """Fill in closest points of paths (B, T, 3), mm, smooth normals there, and rows of facets.
+    """Fill in closest points of paths, smooth normals there, and rows of facets.
 
-    Where there is `doubt` numpy is to decide.
+    Parameters
+    ----------
+    facets : Facets
+    points : array, shape (B, T, 3)
+        mm; neighbours are near to one another, or each costs a search of the whole tree.
+    foot, normal : array, shape (B, T, 3)
+        Filled in: mm, and unit vectors on the mesh's own side.
+    where : array of int, shape (B, T)
+        Filled in: facets in the tree's order.
+    doubt : array of bool, shape (B, T)
+        Filled in: where numpy is to decide.
     """
     nodes, offs = stack()
     for b in range(len(points)):
@@ -102,11 +112,26 @@ def feet(
     height: Floats,
     doubt: Booleans,
 ) -> None:
-    """Fill in feet (B, T, 3) by the smooth normal, normals of their facets, and heights (B, T).
+    """Fill in feet by the smooth normal, normals of their facets, and heights.
 
-    The search begins at the closest points that are `near`, (B, T, 3), and their rows, (B, T).
-    Feet that are not found are no numbers. Samples with `doubt`, (B, T), are for numpy: those whose
-    feet lie on an edge, where it matters which of its facets is named.
+    Parameters
+    ----------
+    facets : Facets
+    points : array, shape (B, T, 3)
+        mm.
+    near : tuple of array (B, T, 3), array of int (B, T)
+        Their closest points, mm, and rows of facets, where the search begins.
+    sign : array, shape (B, 1)
+        Turns the mesh's normals to the tool's side.
+    limits : FootLimits
+    foot, facet : array, shape (B, T, 3)
+        Filled in: mm, NaN where no foot is found; and unit normals of the facets, on the mesh's own
+        side.
+    height : array, shape (B, T)
+        Filled in: over the foot on the tool's side, mm.
+    doubt : array of bool, shape (B, T)
+        Filled in: samples for numpy, whose feet lie on an edge, where it matters which of its
+        facets is named.
     """
     nodes, offs = stack()
     for b in range(len(points)):
@@ -155,8 +180,18 @@ def guesses(
 ) -> Floats:
     """u, v (B, T, 2) beside the nearest nodes of centre lines, in their axes, mm.
 
-    Nodes, `e_v` and normals are (B, nu, 3), `step` (B,) is theirs, `zero` the one at the start, and
-    there are so many `behind` and `ahead` of it, (B,).
+    Parameters
+    ----------
+    line, e_v, normal : array, shape (B, nu, 3)
+        Of the nodes, mm; unit vectors, the normals on the tool's side.
+    behind, ahead : array of int, shape (B,)
+        How many nodes there are on either side of the start.
+    zero : int
+        The node at the start.
+    step : array, shape (B,)
+        From node to node, mm.
+    foot : array, shape (B, T, 3)
+        Points of the surface, mm.
     """
     found = np.empty((foot.shape[0], foot.shape[1], 2))
     for b in range(len(foot)):

@@ -152,6 +152,19 @@ def certified(facets: Facets, row: int, height: float, inside: float, nodes: Hal
     rises over the facet's plane by no more than its slope, from the edges on: seen from the foot,
     a cone that begins `inside` away, mm, and that a point at a height stays off by more than the
     height where inside > height tan(angle / 2).
+
+    Parameters
+    ----------
+    facets : Facets
+        Clearance and slope of the facet are put down in it where they are not known yet.
+    row : int
+        In the tree's order.
+    height : float
+        Of the point over the facet's plane, on either side, mm.
+    inside : float
+        From the foot to the nearest edge, mm.
+    nodes : array
+        Room, of `stack`.
     """
     if facets.reals[row, CLEARANCE] < 0.0:
         _know(facets, row, nodes)
@@ -163,7 +176,18 @@ def certified(facets: Facets, row: int, height: float, inside: float, nodes: Hal
 def followed(
     facets: Facets, p: Vector, row: int, nodes: Halves, offs: Floats
 ) -> tuple[Vector, int]:
-    """Closest point of the mesh, and its row, from a facet nearby on."""
+    """Closest point of the mesh, and its row, from a facet nearby on.
+
+    Parameters
+    ----------
+    facets : Facets
+    p : tuple of float
+        mm.
+    row : int
+        The facet to begin at, in the tree's order; one that is far costs time, and no more.
+    nodes, offs : array
+        Room, of `stack`.
+    """
     reals = facets.reals
     for _ in range(_MOST):
         edge, beside = 0, -np.inf
@@ -265,7 +289,22 @@ def lift(
     limits: SampleLimits,
     out: SampleFeet,
 ) -> None:
-    """Carry samples u, v (B, T), counted in nodes, through patches onto the mesh; fill `out`."""
+    """Carry samples u, v through patches onto the mesh; fill `out`.
+
+    Parameters
+    ----------
+    facets : Facets
+    strip : StripNodes
+    u, v : array, shape (B, T)
+        Counted in nodes from the first one; the patches at the rim carry on beyond it.
+    sign : array, shape (B, 1)
+        Turns the mesh's normals to the tool's side.
+    part : array of int, shape (B,)
+        Component that a stroke may not leave.
+    limits : SampleLimits
+    out : SampleFeet
+        Filled in, shapes (B, T, ...), but for `point` and `way`: those only where there is doubt.
+    """
     nodes, offs = stack()
     nu, nv = strip.values.shape[1] - 1, strip.values.shape[2] - 1
     for b in range(len(u)):

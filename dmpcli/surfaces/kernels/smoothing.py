@@ -42,7 +42,26 @@ def _averaged(arc: Floats, values: Floats, area: Floats, half: float, out: Float
 
 @kernel
 def smoothed(axes: Floats, position: Floats, width: float, passes: int, crease: float) -> Floats:
-    """Frames (B, T, 3, 3) smoothed along paths (B, T, 3), mm, and twiced but over creases."""
+    """Frames (B, T, 3, 3) smoothed along paths (B, T, 3), mm, and twiced but over creases.
+
+    Parameters
+    ----------
+    axes : array, shape (B, T, 3, 3)
+        Columns e_u, e_v, n.
+    position : array, shape (B, T, 3)
+        mm.
+    width : float
+        Half-width of each moving average, mm; it narrows near the ends.
+    passes : int
+        Averages, one after the other.
+    crease : float
+        What is put back fades where it is larger than this, rad.
+
+    Returns
+    -------
+    array, shape (B, T, 3, 3)
+        Orthonormal.
+    """
     out = np.empty_like(axes)
     samples = axes.shape[1]
     arc = np.empty(samples)

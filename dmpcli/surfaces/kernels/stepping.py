@@ -58,7 +58,7 @@ class Walks(NamedTuple):
 
 
 class NodeArrays(NamedTuple):
-    """Nodes of M walks, shapes (M, count, 3) and (M, count)."""
+    """Nodes of lines, shapes (lines, count, 3) and (lines, count)."""
 
     position: Floats
     direction: Floats
@@ -98,8 +98,17 @@ def _probe(
 def start(facets: Facets, limits: WalkLimits, ahead: Walks, behind: Walks, doubt: Booleans) -> None:
     """Find curvature ahead and behind of walks that stand at points of the mesh.
 
-    `before` and `trend` of both ways are filled in; position, direction, normal, step, sign and
-    part are read of those ahead. `doubt` tells which walks numpy is to decide about.
+    Parameters
+    ----------
+    facets : Facets
+    limits : WalkLimits
+    ahead : Walks
+        M walks, of which position, direction, normal, step, sign and part are read; `before` and
+        `trend` are filled in.
+    behind : Walks
+        The same walks the other way, of which only `before` and `trend` are filled in.
+    doubt : array of bool, shape (M,)
+        Filled in: which walks numpy is to decide about.
     """
     nodes, offs = stack()
     for i in range(len(ahead.position)):
@@ -206,9 +215,19 @@ def ends(
     off: Booleans,
     doubt: Booleans,
 ) -> None:
-    """Walk each walk's steps (M,) in place; note which met a crease, and which were ever off.
+    """Walk each walk's steps in place; note which met a crease, and which were ever off.
 
-    What is in doubt is not walked to its end, and stays as it was.
+    Parameters
+    ----------
+    facets : Facets
+    limits : WalkLimits
+    walks : Walks
+        M of them; position, direction and normal are overwritten.
+    steps : array of int, shape (M,)
+    sharp, off : array of bool, shape (M,)
+        Set where it is so, else left.
+    doubt : array of bool, shape (M,)
+        Set for walks that are not walked to their end, and stay where they were.
     """
     nodes, offs = stack()
     for i in range(len(steps)):
@@ -246,7 +265,21 @@ def lines(
 ) -> None:
     """Walk `counts` nodes of each walk, and put them beside node `first` of its row of `out`.
 
-    What is in doubt is not walked to its end.
+    Parameters
+    ----------
+    facets : Facets
+    limits : WalkLimits
+    walks : Walks
+        M of them, at node `first`; they stay as they are.
+    rows : array of int, shape (M,)
+        The row of `out` that each walk fills.
+    counts : array of int, shape (rows of `out`,)
+    first : int
+    way : int
+        1 or -1: to larger nodes or to smaller; directions in `out` point to larger ones.
+    out : NodeArrays
+    doubt : array of bool, shape (M,)
+        Set for walks that are not walked to their end.
     """
     nodes, offs = stack()
     for i in range(len(rows)):

@@ -171,7 +171,13 @@ def fill(reals: Floats, normals: Floats) -> None:
 
 @kernel
 def corner(reals: Floats, row: int, k: int) -> Vector:
-    """Corner k of a facet."""
+    """Corner k of a facet.
+
+    Parameters
+    ----------
+    reals : array, shape (m, 40)
+        Of `Facets`, mm; `row` is in its order, k from 0.
+    """
     return reals[row, 3 * k], reals[row, 3 * k + 1], reals[row, 3 * k + 2]
 
 
@@ -183,14 +189,28 @@ def flat_normal(reals: Floats, row: int) -> Vector:
 
 @kernel
 def outward_of(reals: Floats, row: int, k: int) -> Vector:
-    """Unit vector in a facet's plane, square to an edge."""
+    """Unit vector in a facet's plane, square to an edge.
+
+    Parameters
+    ----------
+    reals : array, shape (m, 40)
+        Of `Facets`; edge k runs from corner k to the next.
+    """
     at = EDGES + 3 * k
     return reals[row, at], reals[row, at + 1], reals[row, at + 2]
 
 
 @kernel
 def smooth_normal(reals: Floats, p: Vector, row: int) -> Vector:
-    """Unit normal at a point of a facet, interpolated between the corners'."""
+    """Unit normal at a point of a facet, interpolated between the corners'.
+
+    Parameters
+    ----------
+    reals : array, shape (m, 40)
+        Of `Facets`.
+    p : tuple of float
+        mm; off the facet's plane it counts by its foot there.
+    """
     x, y, z = p[0] - reals[row, 0], p[1] - reals[row, 1], p[2] - reals[row, 2]
     m = MAP
     return unit(
@@ -305,7 +325,15 @@ def stack() -> tuple[Halves, Floats]:
 
 @kernel
 def closest(facets: Facets, p: Vector, nodes: Halves, offs: Floats) -> tuple[Vector, int]:
-    """Closest point of the mesh, and its row."""
+    """Closest point of the mesh, and its row.
+
+    Parameters
+    ----------
+    p : tuple of float
+        mm.
+    nodes, offs : array
+        Room, of `stack`.
+    """
     foot, row = _within(facets, p, _BALL, nodes, offs)
     if row < 0:
         foot, row = _within(facets, p, np.inf, nodes, offs)
@@ -318,6 +346,11 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
 
     At creases, where sheets touch, and far off the mesh the answer hangs on which of several facets
     at the same distance a search comes upon. Then numpy's way decides, so that both ways agree.
+
+    Parameters
+    ----------
+    p, foot : tuple of float
+        A point and its closest one, which lies on the facet of this row, mm.
     """
     gap = sub(p, foot)
     if not facets.numbers[row, FLAGS] & SPLIT and dot(gap, gap) < _REACH:
@@ -331,7 +364,15 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
 
 @kernel
 def nothing_else(facets: Facets, p: Vector, foot: Vector, nodes: Halves) -> bool:
-    """Tell whether nothing of the mesh but what meets at a foot is as near to a point."""
+    """Tell whether nothing of the mesh but what meets at a foot is as near to a point.
+
+    Parameters
+    ----------
+    p, foot : tuple of float
+        A point and its closest one, mm.
+    nodes : array
+        Room, of `stack`.
+    """
     gap = sub(p, foot)
     reach = length(gap) + _ON
     bound, inner = reach * reach, len(facets.first) - 2

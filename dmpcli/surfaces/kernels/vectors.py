@@ -16,7 +16,15 @@ def at(a: Floats, row: int) -> Vector:
 
 @kernel
 def put(a: Floats, row: int, v: Vector) -> None:
-    """Set a row of vectors (N, 3)."""
+    """Set a row of vectors (N, 3).
+
+    Parameters
+    ----------
+    a : array, shape (N, 3)
+        Overwritten there.
+    row : int
+    v : tuple of float
+    """
     a[row, 0], a[row, 1], a[row, 2] = v
 
 
@@ -77,7 +85,15 @@ def across(a: Vector, normal: Vector) -> Vector:
 
 @kernel
 def turned(a: Vector, before: Vector, after: Vector) -> Vector:
-    """Turn by the smallest rotation from `before` to `after`."""
+    """Turn by the smallest rotation from `before` to `after`.
+
+    Parameters
+    ----------
+    a : tuple of float
+        In any unit.
+    before, after : tuple of float
+        Unit vectors; where they are opposite the result is finite but meaningless.
+    """
     both = add(before, after)
     scale = 2.0 / max(dot(both, both), 1e-12)
     image = sub(a, times(scale * dot(a, both), both))
