@@ -139,7 +139,7 @@ def smooth(
         fitted = design, design.coefficients(moving)
         if cutoff is None:
             fitted = knot_refinement.refined(*fitted, moving, inside, variance)
-    if cutoff is None and not resampled:
+    if cutoff is None and not resampled and not _is_rounding(noise, x):
         # Through all samples there is nothing left, and as many coefficients.
         cost = COST * count if fitted is None else knot_refinement.cost(*fitted, moving, variance)
         corners = cornered(moving, inside, variance, cost, fitted and fitted[0])
@@ -233,6 +233,11 @@ def _too_little(x: Floats, noise: Noise) -> bool:
     """
     extent = float(np.linalg.norm(np.ptp(x, axis=0)))
     return len(x) < FEWEST or bool(noise.typical * len(x) ** 2 <= _NEGLIGIBLE * extent)
+
+
+def _is_rounding(noise: Noise, x: Floats) -> bool:
+    """Whether the noise is that of the numbers: what is held, as an orientation, has no other."""
+    return bool(noise.typical <= ROUNDING * np.max(np.abs(x)))
 
 
 def _variance(x: Floats, noise: Noise) -> float:

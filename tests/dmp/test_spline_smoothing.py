@@ -38,6 +38,17 @@ def peak(acceleration):
     return np.linalg.norm(acceleration, axis=1).max()
 
 
+@pytest.mark.parametrize("rounding", [0.0, 1e-16])
+def test_where_only_the_numbers_are_rounded_no_corners_are_looked_for(monkeypatch, rounding):
+    """An orientation that is held, or a force of none: to look took longer than all the rest."""
+    monkeypatch.setattr(spline_smoothing, "cornered", lambda *_: pytest.fail("looked for"))
+    t = np.linspace(0.0, 10.0, 501)
+    held = np.tile([0.6, 0.0, -0.8, 0.0], (len(t), 1))
+    held += rounding * np.random.default_rng(0).normal(size=held.shape)
+    for values in (held, 0.0 * held):
+        np.testing.assert_allclose(smoothed(t, values)(t), values, atol=2e-15)
+
+
 @pytest.mark.parametrize(("count", "intervals"), [(60, 3), (500, 40), (5000, 11), (9000, 2000)])
 def test_least_squares_agree_with_scipys(count, intervals):
     x = np.random.default_rng(0).normal(size=(count, 3))
