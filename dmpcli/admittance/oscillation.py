@@ -1,8 +1,8 @@
 """A force that swings to and fro: told from noise, steps and slow changes by its alternations.
 
 A loop on the edge of its stability swings with a period of a few of its delays. What counts is one
-alternation after the other: from an extreme to the opposite one by at least `size`, each within
-`longest` s of the last. Noise is too small, a step or a bump alternates once or twice, a slow
+alternation after the other: from an extreme to the opposite one by at least `size`, so many of them
+within `window` s. Noise is too small, a step or a bump alternates once or twice, a slow
 change takes longer.
 """
 

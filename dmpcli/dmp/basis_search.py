@@ -351,7 +351,18 @@ def nearest(points: Floats, path: Floats) -> Floats:
 
 
 def waves(demonstrated: Floats, reproduced: Floats) -> tuple[float, float] | None:
-    """Mean wave heights of open strokes in chart coordinates (T, D); None for a line."""
+    """Mean wave heights of open strokes in chart coordinates; None for a line.
+
+    Parameters
+    ----------
+    demonstrated, reproduced : array, shape (T, D)
+        Whose first two columns are u and v, mm.
+
+    Returns
+    -------
+    tuple of float, or None
+        Of the demonstration and of the reproduction, mm; 0 where the latter has lost its waves.
+    """
     v, length = demonstrated[:, 1], demonstrated[-1, 0] - demonstrated[0, 0]
     if np.ptp(v) < LINE * abs(length):
         return None

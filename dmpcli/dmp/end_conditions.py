@@ -44,7 +44,7 @@ def end_responses(
     -------
     array, shape (2, N)
         x(T_d) and V(T_d) = tau dx/dt: C_i = (1/tau) ∫ (E01, E11)(T_d - t) φ_i(t) dt with
-        φ_i = psi_i/Σpsi · s, by the quadrature of `dynamics.forced`.
+        φ_i = psi_i/Σpsi · s, by the quadrature of `transformation_system.forced`.
     """
     steps = int(np.ceil(duration / longest_step(spring, duration, len(basis)) - 1e-9))
     h = duration / steps
@@ -116,7 +116,7 @@ def start_move(paths: Floats, c: Floats, count: int) -> Floats:
     paths : array, shape (S, M)
         Response to each of the first M functions over even times.
     c : array, shape (S,)
-        That to V0, of `dynamics.homogeneous`.
+        That to V0, of `transformation_system.homogeneous`.
     count : int
         N.
 

@@ -182,7 +182,20 @@ def _runs(interval: Integers) -> tuple[Integers, Integers]:
 
 
 def local_basis(u: Floats, knots: Floats) -> tuple[Integers, Floats]:
-    """Intervals of places u (n,) and the six basis functions that live on them, shape (6, n)."""
+    """Intervals of places and the six basis functions that live on them, by Cox and de Boor.
+
+    Parameters
+    ----------
+    u : array, shape (n,)
+        Places beyond the ends count as of the first or the last interval.
+    knots : array, shape (K + 11,)
+        The K + 1 ends of intervals with five more on either side, not falling.
+
+    Returns
+    -------
+    tuple of array of int (n,), array (6, n)
+        Number of each interval, which is that of its first function too, and the functions' values.
+    """
     last = len(knots) - 2 * DEGREE - 2
     at = np.clip(np.searchsorted(knots, u, side="right") - 1, DEGREE, last + DEGREE)
     right = [knots[at + i] - u for i in range(1, DEGREE + 1)]

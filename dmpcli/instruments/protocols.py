@@ -222,8 +222,8 @@ class PlanPlayer(Protocol):
 
         Raises
         ------
-        RefusedError
-            The arm cannot run them.
+        RefusedError, InstrumentError
+            The arm cannot run them, or the controller does not take them.
         """
 
     def play(self) -> None:

@@ -134,7 +134,19 @@ def heights(position: Floats, foot: Floats, normal: Floats) -> Floats:
 
 
 def tilts(up: Floats, normal: Floats) -> Floats:
-    """Angles (B, n) between tools from their tips upwards and normals, (B, n, 3) each, rad."""
+    """Angles between tools from their tips upwards and normals, rad.
+
+    Parameters
+    ----------
+    up : array, shape (B, n, 3)
+        -R e_z.
+    normal : array, shape (B, n, 3) or (B, 1, 3)
+        On the tool's side.
+
+    Returns
+    -------
+    array, shape (B, n)
+    """
     return np.asarray(np.arctan2(length(cross(up, normal))[..., 0], dot(up, normal)[..., 0]))
 
 
@@ -144,6 +156,18 @@ def path_lengths(foot: Floats) -> Floats:
 
 
 def stretched_lengths(place: Floats, stretch: Floats) -> Floats:
-    """Lengths (B,) of one polyline (m, 2) whose u is stretched, mm."""
+    """Lengths of one polyline whose u is stretched, mm.
+
+    Parameters
+    ----------
+    place : array, shape (m, 2)
+        u, v of its corners, mm.
+    stretch : array, shape (B,)
+        Factors of u.
+
+    Returns
+    -------
+    array, shape (B,)
+    """
     du, dv = np.diff(place, axis=0).T
     return np.asarray(np.hypot(stretch[:, None] * du, dv).sum(axis=1))

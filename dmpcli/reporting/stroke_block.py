@@ -26,7 +26,7 @@ FIGURES = (
     *("length", "duration", "peak_speed", "ldlj", "sparc", "start_error", "goal_error"),
     *(f"surface_{key}" for key in measured.ON_SURFACE),
 )
-"""Columns of `Measured.table`."""
+"""Columns of `MeasuredBlock.table`."""
 
 
 @dataclass(frozen=True)

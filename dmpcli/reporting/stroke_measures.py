@@ -65,7 +65,7 @@ def row_of(stroke: ReportedStroke, reference: ReportedStroke | None) -> Row:
 
 
 def on_surface(stroke: ReportedStroke) -> Row | None:
-    """How a stroke lies on the report's surface; see `Footing`."""
+    """How a stroke lies on the report's surface; see `SurfacePlacement`."""
     footing = stroke.footing
     if footing is None:
         return None

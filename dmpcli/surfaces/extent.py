@@ -18,6 +18,12 @@ def volume(V: Floats, F: Integers) -> float | None:
 
     A piece that is wound against the one whose box holds it is a cavity there. Others count
     whichever way they are wound.
+
+    Parameters
+    ----------
+    V : array, shape (n, 3)
+    F : array of int, shape (m, 3)
+        Faces, wound alike within each piece.
     """
     topology = Topology(F, len(V))
     if not topology.closed(V).all():

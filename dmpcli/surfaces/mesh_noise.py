@@ -123,9 +123,18 @@ def _at_corners(values: Floats, faces: Integers) -> Floats:
 
 
 def averaged(normals: Floats, faces: Integers) -> Floats:
-    """Average unit normals (n, 3) at vertices over their neighbours, several times.
+    """Average unit normals at vertices over their neighbours, several times.
 
-    Vertices of no face get the zero vector.
+    Parameters
+    ----------
+    normals : array, shape (n, 3)
+    faces : array of int, shape (m, 3)
+        Vertices that share a face are neighbours.
+
+    Returns
+    -------
+    array, shape (n, 3)
+        Of length 1; the zero vector at vertices of no face.
     """
     touches, back = _incidence(faces, len(normals))
     for _ in range(_ROUNDS):

@@ -315,6 +315,13 @@ def side(normal: Floats, tool_axis: Floats | None) -> float:
     Where that does not decide (a plane along the tool axis, or a vertical one without
     orientation) the largest component of the normal is made positive: mirrored strokes would
     otherwise follow from rounding.
+
+    Parameters
+    ----------
+    normal : array, shape (3,)
+        Of length 1, base axes.
+    tool_axis : array, shape (3,), or None
+        R e_z, which points into the work.
     """
     toward = normal[2] if tool_axis is None else -(normal @ tool_axis)
     if abs(toward) < UNDECIDED:

@@ -157,12 +157,38 @@ def walked_charts(
 
 
 def closed_direction(closed: Floats, normal: Floats) -> Floats:
-    """e_u of closed strokes: that of their plane, turned to normals (B, 3) with the least turn."""
+    """e_u of closed strokes: that of their plane, turned to the normals with the least turn.
+
+    Parameters
+    ----------
+    closed : array, shape (3, 3)
+        Axes C of the plane that the strokes are in, as columns.
+    normal : array, shape (B, 3)
+        At the starts, on the tool's side.
+
+    Returns
+    -------
+    array, shape (B, 3)
+        Tangent, of length 1.
+    """
     return across(turned(closed[:, 0], closed[:, 2], normal), normal)
 
 
 def goal_coordinates(lift: Callable[[Floats], ChartImage], goal: Floats) -> Floats:
-    """Chart coordinates (B, 3) of goals (B, 3) near the start, by a few Newton steps."""
+    """Chart coordinates of goals near the start, by a few Newton steps.
+
+    Parameters
+    ----------
+    lift : callable
+        Of the charts: from coordinates (B, 1, 3), mm, to the surface.
+    goal : array, shape (B, 3)
+        On the surface, mm.
+
+    Returns
+    -------
+    array, shape (B, 3)
+        u, v, mm, and w = 0.
+    """
     found = np.zeros((len(goal), 1, 3))
     for _ in range(4):
         there = lift(found)

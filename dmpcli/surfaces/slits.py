@@ -1,8 +1,8 @@
 """Edges where sheets touch: borders of each that a step along the smooth normal would not notice.
 
-Mending makes edges of three faces and more borders, one on top of the other (see `mending`). What
-lies beyond such a border can be the same component, as smooth as if nothing were between: the foot
-of a wall that stands on a plate.
+Mending makes edges of three faces and more borders, one on top of the other (see `mesh_repair`).
+What lies beyond such a border can be the same component, as smooth as if nothing were between: the
+foot of a wall that stands on a plate.
 """
 
 import numpy as np
@@ -46,7 +46,15 @@ class Slits:
         return len(self._a)
 
     def near(self, points: Floats, reach: Floats) -> Booleans:
-        """Tell which points (N, 3) may have an edge within their reach (N,), mm."""
+        """Tell which points may have an edge within their reach.
+
+        Parameters
+        ----------
+        points : array, shape (N, 3)
+            mm.
+        reach : array, shape (N,)
+            mm; some that are up to 2 mm farther off are told too, but none is left out.
+        """
         if self._tree is None:
             return np.zeros(len(points), dtype=bool)
         away, _ = self._tree.query(points)

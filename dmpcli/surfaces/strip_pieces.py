@@ -113,7 +113,13 @@ class Strip:
         return np.asarray((grid == dataclasses.astuple(self.grid)).all(axis=1) & near)
 
     def walked(self, rows: Integers, kept: Integers) -> WalkedStrips:
-        """Return some of the strips, which are those of `rows`, with their nodes."""
+        """Return some of the strips, which are those of `rows`, with their nodes.
+
+        Parameters
+        ----------
+        rows, kept : array of int, shape (k,)
+            What the pairs are called outside, and their places among these strips.
+        """
         return WalkedStrips(rows, self.grid, self.cross_step[kept], self.nodes.rows(kept))
 
     def _where(self, at: Floats, step: Floats) -> tuple[Integers, Integers, Floats, Floats]:

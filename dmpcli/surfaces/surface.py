@@ -262,7 +262,13 @@ class Surface(Protocol):
         ...
 
     def connect(self, start: Floats, goal: Floats) -> Connections:
-        """Find geodesics between points (B, 3) on the surface."""
+        """Find geodesics between points on the surface.
+
+        Parameters
+        ----------
+        start, goal : array, shape (B, 3)
+            mm; each start with the goal of its row.
+        """
         ...
 
     def charts(
@@ -289,9 +295,16 @@ class Surface(Protocol):
 
 
 def towards(normal: Floats, side: Floats | None) -> Floats:
-    """Signs (±1), shape (B, 1), that turn normals (B, 3) to the tool's side.
+    """Signs (±1), shape (B, 1), that turn normals to the tool's side.
 
     Where that does not decide, the largest component is made positive, as on planes.
+
+    Parameters
+    ----------
+    normal : array, shape (B, 3)
+        Of length 1, base axes.
+    side : array, shape (3,) or (B, 3), or None
+        From the work to the tool; None is base +z.
     """
     wanted = np.array([0.0, 0.0, 1.0]) if side is None else side
     along = np.sum(normal * wanted, axis=-1, keepdims=True)

@@ -79,7 +79,14 @@ class Sought:
         )
 
     def without(self, lost: Booleans, at: Floats) -> "Sought":
-        """Return these with some given up, and put where they do no harm."""
+        """Return these with some given up, and put where they do no harm.
+
+        Parameters
+        ----------
+        lost : array of bool, shape (B, T)
+        at : array, shape (B, T, 2)
+            u, v of those, mm; the rest of it is not looked at.
+        """
         return Sought(
             np.where(lost[..., None], at, self.at),
             np.where(lost, 0.0, self.height),

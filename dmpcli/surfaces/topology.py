@@ -27,7 +27,15 @@ class Adjacency:
 
     @classmethod
     def of(cls, neighbours: Integers, faces: Integers) -> "Adjacency":
-        """Find the components of faces (m, 3) that share an edge wherever they share a vertex."""
+        """Find the components of faces that share an edge wherever they share a vertex.
+
+        Parameters
+        ----------
+        neighbours : array of int, shape (m, 3)
+            See `Topology.neighbours`.
+        faces : array of int, shape (m, 3)
+            Their vertices.
+        """
         own = np.arange(len(neighbours))[:, None]
         if pieces(np.where(neighbours < 0, own, neighbours)) == 1:
             return cls(neighbours, np.zeros(len(faces), dtype=np.int64))
@@ -124,7 +132,7 @@ class Topology:
         """Tell which components, shape (components,), have no border but where they touch.
 
         A border that lies on another of the same component, run along the other way, is a cut
-        along an edge of several sheets (see `mending`): nothing is open there.
+        along an edge of several sheets (see `mesh_repair`): nothing is open there.
 
         Parameters
         ----------
@@ -151,7 +159,19 @@ class Topology:
 
 
 def places(V: Floats, ends: Integers) -> Integers:
-    """Number the places of vertices (k, 2): those at one point, up to rounding, have one number."""
+    """Number the places of vertices: those at one point, up to rounding, have one number.
+
+    Parameters
+    ----------
+    V : array, shape (n, 3)
+    ends : array of int, shape (k, 2)
+        Vertices, such as the ends of edges.
+
+    Returns
+    -------
+    array of int, shape (k, 2)
+        From 0; their order means nothing.
+    """
     used, number = np.unique(ends, return_inverse=True)
     reach = 1e-9 * float(np.abs(V[used]).max())
     # What is near is near along any line, and hardly any two are: then there is nothing to search.

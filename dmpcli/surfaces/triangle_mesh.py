@@ -98,7 +98,7 @@ class TriangleMesh:
 
     @cached_property
     def shape(self) -> MeshShape:
-        """Normals, creases and noise of all its faces; of few of them ask `shape_at`."""
+        """Normals, creases and noise of all its faces; of few ask `noise_at` and its like."""
         return MeshShape(self.V, self.F, self.topology)
 
     @cached_property
@@ -230,7 +230,19 @@ class TriangleMesh:
         return foot, face
 
     def smooth_normals(self, position: Floats, face: Integers) -> Floats:
-        """Unit normals (N, 3) at points of faces, interpolated between the corners'."""
+        """Unit normals at points of faces, interpolated between the corners'.
+
+        Parameters
+        ----------
+        position : array, shape (N, 3)
+            mm; off a face's plane it counts by its foot there.
+        face : array of int, shape (N,)
+
+        Returns
+        -------
+        array, shape (N, 3)
+            On the mesh's own side.
+        """
         maps = self._normal_maps(face)
         local = position - self._middle
         return unit(np.einsum("nij,nj->ni", maps[..., :3], local) + maps[..., 3])

@@ -126,7 +126,15 @@ def over_feet(
 
 @kernel
 def stretched_lengths(place: Floats, stretch: Floats) -> Floats:
-    """Lengths (B,) of one polyline (m, 2) whose u is stretched, mm."""
+    """Lengths (B,) of one polyline whose u is stretched, mm; see `many_on_surface`.
+
+    Parameters
+    ----------
+    place : array, shape (m, 2)
+        u, v of its corners, mm.
+    stretch : array, shape (B,)
+        Factors of u.
+    """
     found = np.zeros(len(stretch))
     for b in range(len(stretch)):
         for i in range(len(place) - 1):

@@ -116,7 +116,15 @@ def smoothness(
 
 @kernel
 def less_line(p: Floats, waves: Floats) -> None:
-    """Fill in (3, B, n - 2) what lies between both ends, less the line from one to the other."""
+    """Fill in what lies between both ends, less the line from one to the other.
+
+    Parameters
+    ----------
+    p : array, shape (3, B, n)
+        Of strokes, evenly spaced in time; in any unit.
+    waves : array, shape (3, B, n - 2)
+        Filled in.
+    """
     n = p.shape[2]
     for k in range(3):
         for b in range(p.shape[1]):

@@ -14,7 +14,7 @@ _DEEPEST = 20.0
 
 @dataclass(frozen=True)
 class SpringWorkpiece:
-    """A workpiece whose surface pushes back like a spring; a `dmpcli.simulation.mock.Solid`.
+    """A workpiece whose surface pushes back like a spring; a `mock.contact.Solid`.
 
     Attributes
     ----------

@@ -230,7 +230,15 @@ def smooth_normal(reals: Floats, p: Vector, row: int) -> Vector:
 
 @kernel
 def on_facet(reals: Floats, row: int, p: Vector) -> Vector:
-    """Closest point of a facet (C. Ericson: Real-time collision detection, 2005, sec. 5.1.5)."""
+    """Closest point of a facet (C. Ericson: Real-time collision detection, 2005, sec. 5.1.5).
+
+    Parameters
+    ----------
+    reals : array, shape (m, 40)
+        Of `Facets`.
+    p : tuple of float
+        mm.
+    """
     a = corner(reals, row, 0)
     b = corner(reals, row, 1)
     c = corner(reals, row, 2)
