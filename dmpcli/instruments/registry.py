@@ -94,7 +94,7 @@ def _installed(role: str) -> "EntryPoints":
 
 @lru_cache(maxsize=8)
 def _read(
-    entry_points: "Callable[..., EntryPoints]", group: str, path: tuple[str, ...]
+    entry_points: "Callable[..., EntryPoints]", group: str, _path: tuple[str, ...]
 ) -> "EntryPoints":
     """Read them once a process: it goes through all packages on the path, and a URL asks often."""
     return entry_points(group=group)
