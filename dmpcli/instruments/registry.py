@@ -7,7 +7,9 @@ their own: their world goes on as far as the clock that they are given, real or 
 attribute ``port`` is the port that a URL without one means.
 """
 
+import sys
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dmpcli.errors import InputError
@@ -87,7 +89,15 @@ def default_port(address: Address) -> int | None:
 def _installed(role: str) -> "EntryPoints":
     from importlib import metadata  # a rehearsal needs no drivers and starts sooner without
 
-    return metadata.entry_points(group=GROUPS[role])
+    return _read(metadata.entry_points, GROUPS[role], tuple(sys.path))
+
+
+@lru_cache(maxsize=8)
+def _read(
+    entry_points: "Callable[..., EntryPoints]", group: str, _path: tuple[str, ...]
+) -> "EntryPoints":
+    """Read them once a process: it goes through all packages on the path, and a URL asks often."""
+    return entry_points(group=group)
 
 
 def _load(role: str, scheme: str) -> Any:

@@ -139,6 +139,16 @@ def test_drivers_are_found_by_their_entry_points(installed):
     assert str(address) == "--robot brand://arm.local:99"
 
 
+def test_what_is_installed_is_looked_up_once_for_many_urls(installed, monkeypatch):
+    looked, entry_points = [], metadata.entry_points
+    monkeypatch.setattr(
+        metadata, "entry_points", lambda **only: looked.append(only) or entry_points(**only)
+    )
+    for _ in range(3):
+        workcell.connect("brand://h", "brand://h", SimulatedClock())
+    assert looked == [{"group": "dmpcli.robots"}, {"group": "dmpcli.sensors"}]
+
+
 def test_an_unknown_scheme_names_those_that_are_installed(installed):
     with pytest.raises(InputError, match="one of mock:, brand://HOST, broken://HOST, twice://HO"):
         workcell.check("elite://10.0.0.1")

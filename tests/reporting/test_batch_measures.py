@@ -214,10 +214,8 @@ def test_on_a_mesh(tmp_path):
     assert np.isnan(column(alike(folder, taught()), "wave_height")).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["modified", "original"])
-@pytest.mark.parametrize("count", [1, 5])
-def test_on_a_cylinder(tmp_path, model, count):
+def around_a_cylinder(folder, model, count):
+    """Put a batch of strokes on a cylinder into a folder; return it, and the surface."""
     radius = 400.0
     tube = Cylinder(START - [0.0, 0.0, radius], np.array([1.0, 0.0, 0.0]), radius)
     made = strokes(count, n=101)
@@ -229,12 +227,26 @@ def test_on_a_cylinder(tmp_path, model, count):
         turn = np.stack([np.sin(stroke["t"]), np.zeros(101), np.zeros(101)], axis=-1)
         stroke["euler"] = np.array([np.pi, 0.0, 0.0]) + 0.3 * turn
         del stroke["normal"]
-    folder = put_batch(tmp_path / "b", [made], facts={"model": model})
-    table = alike(folder, taught(), ReportSurface("tube", tube), None)
-    if importlib.util.find_spec("numba"):
-        alike_by_kernels(folder, taught(), ReportSurface("tube", tube))
+    return put_batch(folder, [made], facts={"model": model}), ReportSurface("tube", tube)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["modified", "original"])
+@pytest.mark.parametrize("count", [1, 5])
+def test_on_a_cylinder(tmp_path, model, count):
+    folder, tube = around_a_cylinder(tmp_path / "b", model, count)
+    table = alike(folder, taught(), tube, None)
     assert np.isfinite(column(table, "surface_tilt_mean")).all()
     assert np.isfinite(column(table, "surface_length_change")).all()
+
+
+@needs(extras.FAST)
+@pytest.mark.thorough
+@pytest.mark.parametrize("model", ["modified", "original"])
+@pytest.mark.parametrize("count", [1, 5])
+def test_kernels_measure_strokes_on_a_cylinder_as_each_is_measured(tmp_path, model, count):
+    folder, tube = around_a_cylinder(tmp_path / "b", model, count)
+    alike_by_kernels(folder, taught(), tube)
 
 
 @pytest.mark.slow

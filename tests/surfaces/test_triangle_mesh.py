@@ -1,8 +1,11 @@
 """Closest points are the same however often, and by whatever means, they were asked before."""
 
 import numpy as np
+import pytest
 
+from dmpcli import extras
 from dmpcli.surfaces.mesh import Mesh
+from tests.extras_here import needs
 from tests.surfaces import cases, zoo
 
 
@@ -33,6 +36,8 @@ def test_few_points_are_where_they_are_among_many():
             assert one.face == many.face[row]
 
 
+@needs(extras.FAST)
+@pytest.mark.thorough
 def test_kernels_do_not_answer_with_what_numpy_found_before():
     mesh = zoo.mesh("ribbed")
     points = mesh.corners.mean(axis=1)[:6] + 0.1
@@ -42,6 +47,8 @@ def test_kernels_do_not_answer_with_what_numpy_found_before():
     np.testing.assert_array_equal(after.normal, alone.normal)
 
 
+@needs(extras.FAST)
+@pytest.mark.thorough
 def test_kernels_find_the_points_that_the_library_finds_and_take_what_is_no_number():
     rng = np.random.default_rng(3)
     for name in ("drilled", "united", "ribbed"):
