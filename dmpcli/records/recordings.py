@@ -18,6 +18,7 @@ from dmpcli.records import (
     qualisys,
     record,
     rotation_forms,
+    rotation_names,
     schemas,
     stamps,
     tables,
@@ -174,7 +175,7 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
     _check_time(reading.table, stroke.t, name)
     _check_position(reading.table, stroke.position)
     _doubt_units(reading, stroke)
-    reading.doubts += rotation_forms.unread(reading.names, reading.taken)
+    reading.doubts += rotation_names.unread(reading.names, reading.taken, rotation is not None)
     if felt is not None and len(felt) != len(stroke.t):
         felt = None
         reading.told.append("the wrench is left out: rows with one stamp were made one")

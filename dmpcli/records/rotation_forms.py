@@ -4,7 +4,6 @@ Euler orders are named as scipy names them: capitals turn about the tool's own a
 small letters about the base's (extrinsic). The turns are scipy's too.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 
@@ -33,24 +32,8 @@ QUATERNIONS = {"quaternion": "xyzw", "xyzw": "xyzw", "wxyz": "wxyz"}
 _UNIT = 1e-2
 """What a quaternion's norm, or a matrix's columns, may miss of 1."""
 
-_NUMBERED = (("q0", "q1", "q2", "q3"), ("q1", "q2", "q3", "q4"))
+NUMBERED = (("q0", "q1", "q2", "q3"), ("q1", "q2", "q3", "q4"))
 
-# Groups of columns that look like a rotation, as ends of their names, and the words that read them.
-_LOOKS = (
-    (QUATERNION_NAMES, "--rotation quaternion"),
-    (("q_x", "q_y", "q_z", "q_w"), "--rotation quaternion with --map qx=..."),
-    (
-        ("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
-        "--layout ros, or --rotation quaternion with --map qx=...",
-    ),
-    (_NUMBERED[0], "--rotation wxyz or xyzw"),
-    (_NUMBERED[1], "--rotation wxyz or xyzw"),
-    (EULER_NAMES, "--rotation with --map rx=..."),
-    (("roll", "pitch", "yaw"), "--rotation rpy --map rx=roll --map ry=pitch --map rz=yaw"),
-    (tuple(f"actual_TCP_pose_{i}" for i in (3, 4, 5)), "--layout ur"),
-    (("A", "B", "C"), "--rotation rpy --angle-unit deg --map rx=C --map ry=B --map rz=A (KUKA)"),
-    (("W", "P", "R"), "--rotation rpy --angle-unit deg --map rx=W --map ry=P --map rz=R (Fanuc)"),
-)
 # A step between samples, rad, that no hand makes, and how much smaller another form's must be.
 _LEAP, _CALMER = np.radians(20.0), 0.25
 
@@ -156,7 +139,7 @@ def numbered(form: str, names: Sequence[str]) -> Mapping[str, str]:
     InputError
         They are there, and the form does not tell their order.
     """
-    for group in _NUMBERED:
+    for group in NUMBERED:
         if all(name in names for name in group):
             if form == "quaternion":
                 raise InputError(
@@ -165,29 +148,6 @@ def numbered(form: str, names: Sequence[str]) -> Mapping[str, str]:
                 )
             return {f"q{axis}": name for axis, name in zip(form, group, strict=True)}
     return {}
-
-
-def unread(names: Sequence[str], taken: Sequence[str]) -> list[str]:
-    """Say which columns look like a rotation but were not read, and what reads them.
-
-    Parameters
-    ----------
-    names, taken : sequence of str
-        All columns, and those that were read.
-    """
-    remarks = []
-    for ends, option in _LOOKS:
-        for first in names:
-            before = re.fullmatch(f"(.*){re.escape(ends[0])}", first)
-            if before is None or (before[1] and before[1][-1].isalnum()):
-                continue
-            group = [before[1] + end for end in ends]
-            if all(name in names for name in group) and not set(group) & set(taken):
-                remarks.append(
-                    f"columns {', '.join(group)} are there but were not read; {option} reads them"
-                )
-                taken = [*taken, *group]
-    return remarks
 
 
 def calmer(values: Floats, R: Floats) -> str | None:

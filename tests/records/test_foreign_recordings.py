@@ -1,5 +1,8 @@
 """One stroke as other programs write it: each file is read to the same stroke, or refused."""
 
+import re
+import shlex
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -267,6 +270,67 @@ def test_columns_that_look_like_a_rotation_but_were_not_read_are_named(names, op
     (doubt,) = found.doubts
     assert f"columns {names.replace(',', ', ')} are there but were not read" in doubt
     assert option in doubt
+
+
+@pytest.mark.parametrize(
+    ("names", "form"),
+    [
+        ("Qx,Qy,Qz,Qw", "quaternion"),
+        ("QX,QY,QZ,QW", "quaternion"),
+        ("quat_w,quat_x,quat_y,quat_z", "wxyz"),
+        ("ox,oy,oz,ow", "quaternion"),
+        ("orientation_x,orientation_y,orientation_z,orientation_w", "quaternion"),
+        ("Rotation X,Rotation Y,Rotation Z,Rotation W", "quaternion"),
+        ("quaternion_0,quaternion_1,quaternion_2,quaternion_3", "numbered"),
+        ("Rx,Ry,Rz", "rotvec"),
+        ("rot_x,rot_y,rot_z", "rotvec"),
+        ("Rotation X,Rotation Y,Rotation Z", "rotvec"),
+        ("theta_x_rad,theta_y_rad,theta_z_rad", "rpy"),
+        ("Roll,Pitch,Yaw", "rpy"),
+        ("tool_roll_rad,tool_pitch_rad,tool_yaw_rad", "rpy"),
+    ],
+)
+def test_rotations_of_other_names_are_named_with_what_reads_them(names, form):
+    values = {
+        "quaternion": QUATERNION,
+        "numbered": QUATERNION,
+        "wxyz": WXYZ,
+        "rotvec": R.as_rotvec(),
+        "rpy": R.as_euler("xyz"),
+    }[form]
+    text = table(f"t,x,y,z,{names}", T, *XYZ.T, *values.T)
+    found = taken(text)
+    assert found.stroke.rotation is None
+    (doubt,) = found.doubts
+    assert "are there but were not read" in doubt
+    said = re.search(r"--rotation (\w+)", doubt)[1]
+    words = shlex.split(doubt)
+    named = [words[i + 1] for i, word in enumerate(words) if word == "--map"]
+    assert_is_the_stroke(taken(text, rotation=said, mapping=named))
+
+
+@pytest.mark.parametrize(
+    "names", ["R00,R01,R02,R10,R11,R12,R20,R21,R22", "r11,r12,r13,r21,r22,r23,r31,r32,r33"]
+)
+def test_a_rotation_matrix_that_was_not_read_is_named(names):
+    found = taken(table(f"t,x,y,z,{names}", T, *XYZ.T, *R.as_matrix().reshape(-1, 9).T))
+    assert found.stroke.rotation is None
+    assert "--rotation matrix" in found.doubts[0]
+
+
+def test_a_fourth_column_that_makes_a_quaternion_of_three_angles_is_named():
+    found = taken(table("t,x,y,z,rx,ry,rz,rw", T, *XYZ.T, *QUATERNION.T))
+    assert any(
+        "column rw was not read, and makes a quaternion of rx, ry, rz" in doubt
+        for doubt in found.doubts
+    )
+
+
+@pytest.mark.parametrize("names", ["vx,vy,vz", "q0,q1,q2,q3,q4,q5", "fx,fy,fz", "a,b,c", "u,v,w"])
+def test_what_is_no_rotation_by_its_names_is_not_doubted(names):
+    columns = names.split(",")
+    text = table(f"t,x,y,z,{names}", T, *XYZ.T, *([0.1 * T] * len(columns)))
+    assert not any("not read" in doubt for doubt in taken(text).doubts)
 
 
 def test_a_rotation_that_was_asked_for_and_is_not_there_is_refused():
