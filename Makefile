@@ -4,10 +4,10 @@
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make reproduce-force  force on surfaces that are not where the plan has them, in physics
-#   make test        tests, lint, types and import rules, in nine minutes on two cores
+#   make test        tests, ruff and import rules, in six minutes on two cores
 #   make test-quick  the quick half of the tests
 #   make test-thorough  those that take a minute each or go through all cases of a kind
-#   make lint        ruff, mypy and import-linter
+#   make lint        ruff, import-linter and mypy: make rules and make types
 #   make coverage    the quick half again, and which lines it does not run
 #   make test-lowest the same with the lowest versions that pyproject.toml allows
 #   make docs        the pages as a site, in out/docs/site; a warning is an error
@@ -48,7 +48,7 @@ export MYPY_CACHE_DIR := $(CACHE)/mypy
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick test-thorough coverage test-lowest lint lock dist bench peers \
+.PHONY: help setup docs reference demo reproduce reproduce-force test test-quick test-thorough coverage test-lowest lint rules types lock dist bench peers \
     judges pages properties faults soak mutations mutants cluster-demo samples pictures schemas clean FORCE
 
 help:
@@ -64,10 +64,11 @@ setup: $(VENV)/installed
 
 # Tests. The quick half leaves out what is marked slow; make test leaves out what is marked thorough:
 # kernels, which compile for a minute, clusters and laboratories in real time, and of sweeps all
-# cases but a few. A file's tests stay in one process, so that what they share is made once. Lint and
-# types are looked at meanwhile: some tests wait in real time, and mypy is one process. For the same
-# reason there are three processes to two cores, and of the thorough, which wait most, four; WORKERS=N
-# chooses. In a clone that is new one process makes the asserts of all tests ready, not each.
+# cases but a few. A file's tests stay in one process, so that what they share is made once. Rules
+# are looked at meanwhile; types, which mypy takes a minute and a half for in a clone that is new,
+# are a step of their own. Some tests wait in real time: so there are three processes to two cores,
+# and of the thorough, which wait most, four; WORKERS=N chooses. In a clone that is new one process
+# makes the asserts of all tests ready, not each.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest
@@ -75,15 +76,17 @@ MANY  := --dist loadfile --no-loadscope-reorder --numprocesses
 MORE  := $(MANY) $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2))
 TWICE := $(MANY) $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
 QUICK := $(MORE) -m "not slow and not thorough"
+READY := [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }
 
 test: $(VENV)/installed
-	@mkdir -p $(OUT)
-	@nice -n 5 $(MAKE) --no-print-directory lint > $(OUT)/lint.log 2>&1 & lint=$$!; \
-	    [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }; \
+	@mkdir -p $(CACHE)
+	@nice -n 5 $(MAKE) --no-print-directory rules > $(OUT)/lint.log 2>&1 & lint=$$!; \
+	    $(READY); \
 	    $(PYTEST) $(MORE) -m "not thorough"; tests=$$?; wait $$lint; linted=$$?; \
 	    cat $(OUT)/lint.log; exit $$((tests | linted))
 
 test-quick: $(VENV)/installed
+	@mkdir -p $(CACHE); $(READY)
 	$(PYTEST) $(QUICK)
 
 test-thorough: $(VENV)/installed
@@ -97,11 +100,15 @@ coverage: $(VENV)/installed
 test-lowest:
 	$(MAKE) --no-print-directory test-quick VENV=$(OUT)/lowest/venv LOCK=requirements-lowest.lock
 
-lint: $(VENV)/installed
+lint: rules types
+
+rules: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports --cache-dir $(CACHE)/import-linter
+
+types: $(VENV)/installed
+	$(BIN)/mypy
 
 # The lock files, each for every Python from 3.11 on; UPGRADE=--upgrade takes the newest versions.
 

@@ -86,6 +86,7 @@ def batch(tmp_path_factory):
     return folder
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_person_at_the_terminal_sees_how_far_a_batch_is(batch, tmp_path, jobs):
@@ -102,7 +103,7 @@ def test_a_person_at_the_terminal_sees_how_far_a_batch_is(batch, tmp_path, jobs)
     assert "3600 strokes drawn, 400 pairs skipped" in bare
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_share_of_a_batch_counts_its_own_pairs(batch, tmp_path):
     words = ["generalize", "skill.json", "--pairs", "pairs.csv", "--on-error", "skip"]
     words += ["--shard", "2/4", "--pairs-per-part", "100", "-o", tmp_path / "out"]

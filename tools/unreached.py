@@ -37,7 +37,9 @@ class Package:
             self._module(path, root): ast.parse(path.read_text(encoding="utf-8"))
             for path in sorted(root.rglob("*.py"))
         }
-        self.imported = {module: self._imported(tree) for module, tree in self.trees.items()}
+        # Each tree is walked once; what is looked for in it is looked for several times.
+        self._nodes = {module: list(ast.walk(tree)) for module, tree in self.trees.items()}
+        self.imported = {module: self._imported(module) for module in self.trees}
         self.used: set[tuple[str, str]] = set()
         self.attributes: dict[str, list[tuple[str, int]]] = {}
         for module, tree in self.trees.items():
@@ -49,7 +51,7 @@ class Package:
             for name, node in _defined(tree):
                 if (module, name) not in self.used and not name.startswith("__"):
                     yield f"{module}.{name}", node.lineno
-            for kind in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+            for kind in (one for one in self._nodes[module] if isinstance(one, ast.ClassDef)):
                 if all(self._is_ours(module, base) for base in kind.bases):
                     yield from self._methods(module, kind)
 
@@ -68,19 +70,20 @@ class Package:
         ours = name in dict(_defined(self.trees[module])) or name in self.imported[module]
         return ours or name in ("Protocol", "Enum", "IntEnum", "NamedTuple", "Generic")
 
-    def _imported(self, tree: ast.Module) -> dict[str, tuple[str, str]]:
+    def _imported(self, module: str) -> dict[str, tuple[str, str]]:
         """Names that a module has from another of the package, and what they are there."""
         return {
             alias.asname or alias.name: (str(node.module), alias.name)
-            for node in ast.walk(tree)
+            for node in self._nodes[module]
             if isinstance(node, ast.ImportFrom) and str(node.module).startswith(self.name)
             for alias in node.names
         }
 
     def _look_through(self, module: str, tree: ast.Module) -> None:
         own, imported = dict(_defined(tree)), self.imported[module]
-        owners = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
-        for node in ast.walk(tree):
+        nodes = self._nodes[module]
+        owners = {id(n.value) for n in nodes if isinstance(n, ast.Attribute)}
+        for node in nodes:
             match node:
                 case ast.Name(id=name, ctx=ast.Load()):
                     defined = own.get(name)

@@ -58,7 +58,7 @@ def put(store, path, key):
     return f"s3://{BUCKET}/{key}"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_batch_of_a_store_has_the_bytes_of_one_of_a_folder(learned, whole, store):
     table, files = whole
     skill, pairs = put(store, learned, "in/s.json"), put(store, table, "in/p.csv")

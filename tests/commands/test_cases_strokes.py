@@ -187,6 +187,7 @@ def test_two_walls_that_lean_either_way_are_one_wave(lab):
     assert not warnings(said)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("leans", [(-3,), (-1,), (1,), (3,), (-3, 3), (3, -3)])
 def test_a_closed_letter_on_a_wall_that_leans_is_the_same_letter(lab, leans):
@@ -224,6 +225,7 @@ def test_a_seam_over_a_hump_rises_wherever_it_leads(lab, goal):
     assert z.max() == pytest.approx(1.2, abs=0.02)
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y"])
 @pytest.mark.parametrize("degrees", [-30, 30])
@@ -281,6 +283,7 @@ def test_one_path_at_four_timings_is_that_path(lab):
     assert "timing_3.csv: rests from" in said
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
 @pytest.mark.parametrize("seed", [7, 8])
@@ -312,6 +315,7 @@ def test_noise_is_not_drawn(lab):
     assert max(missed) <= 1.2
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_uneven_stamps_never_overshoot(lab, seed):
@@ -495,6 +499,7 @@ def test_what_is_taught_on_a_curved_part_is_drawn_on_any(lab, saddle, taught):
         assert not warnings(said)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["on_saddle 0", "on_saddle 40", "on_bow 600"])
 def test_what_would_dig_into_another_surface_is_refused_with_remedies(lab, name):

@@ -576,6 +576,7 @@ def after(process, seconds, number):
     process.send_signal(number)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_decelerates_and_keeps_the_run(traj, tmp_path, number, code):
@@ -623,7 +624,7 @@ def test_the_command_line_loads_no_heavy_library():
     assert json.loads(done.stdout) == []
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_running_loads_no_scipy(traj, tmp_path):
     code = (
         "import sys; from dmpcli.cli import app;"

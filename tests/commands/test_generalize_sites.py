@@ -156,6 +156,7 @@ def test_a_part_holds_few_surfaces_and_its_pairs_in_the_order_of_the_table(drawn
         assert list(dict.fromkeys(ids)) == rows["id"].tolist()
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [("--jobs", 2), ("--surface-cache", "kept")])
 def test_processes_shards_and_kept_meshes_change_no_byte(shop, drawn, tmp_path, options):

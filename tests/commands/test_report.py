@@ -244,7 +244,7 @@ def curved(tmp_path, files):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_on_a_mesh_modified_and_original_stand_side_by_side(tmp_path, curved):
     *strokes, mesh = curved.values()
     report = document(*strokes, "--surface", mesh)

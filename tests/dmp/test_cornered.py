@@ -86,6 +86,7 @@ def test_what_is_smooth_between_corners_stays_smooth():
     assert peaks[0] <= 1.3 * peaks[1]
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_smooth_strokes_have_no_corners(sigma):

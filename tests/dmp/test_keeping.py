@@ -104,6 +104,7 @@ def test_it_begins_and_ends_at_the_demonstrated_velocity(
     assert velocity == pytest.approx(taught, abs=2e-6 * np.abs(taught).max())
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", ["Snake", "WShape"])
 def test_strokes_that_people_stop_abruptly_end_at_their_velocity(shape):
@@ -136,6 +137,7 @@ def from_table(table):
     return Trajectory(table[:, 0], table[:, 1:4], rotation)
 
 
+@pytest.mark.sweep(kept=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "lifted", "aslant"])
 @pytest.mark.parametrize("regression", ["lwr", "ridge"])
@@ -152,6 +154,7 @@ def test_moving_a_recording_with_its_tool_moves_the_drawn_stroke(name, regressio
     np.testing.assert_allclose(found, turned, atol=1e-7)
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "wandering", "lifted"])
 def test_mirroring_a_recording_mirrors_the_drawn_stroke(name):

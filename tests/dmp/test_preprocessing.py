@@ -60,6 +60,7 @@ def test_approach_and_retract_once_cut_leave_the_wave():
     assert np.abs(cut.position(np.linspace(0, cut.duration, 500))[:, 2]).max() < 0.2
 
 
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.0, 0.01, 0.1])
 def test_a_pause_once_cut_leaves_the_wave(sigma):

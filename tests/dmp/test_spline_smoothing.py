@@ -145,6 +145,7 @@ def test_intervals_are_short_at_corners_only(monkeypatch):
         assert np.abs(middles[:, None] - corner).min(axis=1).max() <= 0.1
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 def test_letters_that_begin_and_end_in_motion_keep_their_ends_and_acceleration(sigma):
@@ -281,6 +282,7 @@ def test_without_noise_the_variance_is_that_of_rounding_at_the_stroke_s_size(siz
     assert _variance(x, noise.Noise(np.eye(3), np.full(3, 2.0))) == pytest.approx(12.0)
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 15, 26])
 def test_smoothing_keeps_handwriting_that_straight_lines_follow(seed):

@@ -141,7 +141,7 @@ def test_an_interrupted_writer_leaves_the_old_file(in_process, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["skill.json"]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_nothing_but_data_goes_to_standard_output(dmpcli):
     skill = dmpcli("fit", REFERENCE, "-o", "-").stdout
     assert json.loads(skill)["schema"] == "skill"
@@ -173,7 +173,7 @@ def test_every_command_refuses_what_is_no_input_in_a_line_or_two(
 
 @pytest.mark.sweep(kept=1)
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["fit demo -o -", "inspect demo", "record -o - --duration 2"])
+@pytest.mark.parametrize("command", ["fit demo -o -", "record -o - --duration 2", "inspect demo"])
 def test_a_full_or_closed_standard_output_is_one_line_and_a_lost_reader_is_sigpipe(
     tmp_path, command
 ):
