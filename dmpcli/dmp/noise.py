@@ -8,6 +8,7 @@ where it is small against the stroke, and present all along the recording. Elsew
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -97,7 +98,7 @@ class Noise:
         """Variance over all axes."""
         return float(np.sum(self.sigma**2))
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """Standard deviation along the noisiest axis."""
         return float(np.max(self.sigma))
