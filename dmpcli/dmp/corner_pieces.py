@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.dmp import knot_refinement
+from dmpcli.dmp import gram_polynomials, knot_refinement
 from dmpcli.dmp.least_squares import DEGREE, Design
 from dmpcli.dmp.noise import Noise
 from dmpcli.dmp.spline_ends import derivatives, end
@@ -142,22 +142,23 @@ def least(x: Floats, low: float, high: float, noise: Noise, variance: float) -> 
     return np.inf if piece is None else piece.cost(variance)
 
 
-def explained(residual: Floats, noise: Noise) -> bool:
-    """Whether noise explains a residual (n, D) everywhere."""
-    from scipy.special import chdtri
+def missed(x: Floats, low: float, high: float) -> float:
+    """Squares that the best polynomial that is tried leaves of the samples in [low, high]."""
+    y = x[int(np.ceil(low)) : int(np.floor(high)) + 1]
+    Q = gram_polynomials.at_samples(len(y), min(_TRIED, len(y) - 2))
+    return float(np.sum((y - Q @ (Q.T @ y)) ** 2))
 
-    squares = knot_refinement.squares(residual, noise.largest, _WINDOWS)
-    return bool(squares.max() <= chdtri(residual.shape[1], _CHANCE / squares.size))
+
+def explained(residual: Floats, noise: Noise) -> bool:
+    """Whether noise explains a residual (n, D) everywhere: each sliding mean, and each peak."""
+    return knot_refinement.within(residual, noise.largest, _WINDOWS, _CHANCE)
 
 
 def _polynomial(
     y: Floats, begin: int, low: float, high: float, noise: Noise, variance: float, at_end: bool
 ) -> SmoothPiece | None:
-    from numpy.polynomial.legendre import legder, legval, legvander
-
     count = len(y)
-    u = 2.0 * (begin + np.arange(count) - low) / (high - low) - 1.0
-    Q, R = np.linalg.qr(legvander(u, min(_TRIED, count - 2)))
+    Q = gram_polynomials.at_samples(count, min(_TRIED, count - 2))
     shares = Q.T @ y
     penalty = _PENALTY * (1.0 + _UNSURE / np.sqrt(count)) * variance
     worth = np.cumsum(np.sum(shares**2, axis=1) - penalty)
@@ -168,13 +169,9 @@ def _polynomial(
     values = Q @ shares
     if not explained(y - values, noise):
         return None
-    R = R[: degree + 1, : degree + 1]
-    at_ends = [
-        legval(np.array([-1.0, 1.0]), legder(np.eye(degree + 1), order)).T
-        * (2.0 / (high - low)) ** order
-        for order in range(_JOINED)
-    ]
-    rows = np.linalg.solve(R.T, np.stack(at_ends, axis=1).reshape(-1, degree + 1).T).T
+    rows = np.concatenate(
+        [gram_polynomials.at(count, degree, edge - begin, _JOINED) for edge in (low, high)]
+    )
     return _piece(y, values, degree + 1.0, rows @ shares, rows @ rows.T, Q @ rows.T, None)
 
 
@@ -242,8 +239,9 @@ def _best(y: Floats, begin: int, low: float, high: float, variance: float) -> De
     while count > max(2 * K, K + DEGREE) and risen < _RISEN:
         unit = K / (high - low)
         design = Design(count, (begin - low) * unit, unit, np.arange(K + 1.0), True)
-        left = np.sum(design.residual(y) ** 2, axis=1)
-        cost = float(np.sum(np.minimum(left, _CLIP**2 * variance))) / variance + COST * design.size
+        residual = design.residual(y)
+        left = np.einsum("td,td->t", residual, residual)
+        cost = float(np.minimum(left, _CLIP**2 * variance).sum()) / variance + COST * design.size
         if cost < least:
             best, least, risen = design, cost, 0
         elif float(np.median(left)) <= variance:

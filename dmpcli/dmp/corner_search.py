@@ -6,9 +6,14 @@ P. Fryzlewicz, J. R. Statist. Soc. B 81, 2019), and likelier than a bend. Its ti
 goes before and what comes after are nearest each other: known within about σ of the way.
 """
 
+from functools import lru_cache
+from itertools import accumulate
+from math import ceil, floor, log
+
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.dmp import gram_polynomials
 from dmpcli.dmp.noise import Noise
 
 Candidate = tuple[float, float]
@@ -136,26 +141,32 @@ def _extrapolated(
     x: Floats, at: float, low: float, high: float, noise: Noise
 ) -> tuple[Floats, Floats] | None:
     """Value and derivative by samples, at a time, of what is in [low, high], shapes (D,)."""
-    from scipy.special import chdtri
-
-    begin, end = max(0, int(np.ceil(low))), min(len(x), int(np.floor(high)) + 1)
+    begin, end = max(0, ceil(low)), min(len(x), floor(high) + 1)
     axes, sigma2 = x.shape[1], noise.largest**2
     size = end - begin
     result = None
     while size >= _HIGHEST:
         # Those next to the corner.
-        j = np.arange(begin, begin + size) if low >= at else np.arange(end - size, end)
+        first = begin if low >= at else end - size
+        y = x[first : first + size]
         degree = min(_HIGHEST, size - 2)
-        Q, R = np.linalg.qr(np.vander((j - at) / size, degree + 1, increasing=True))
-        shares = Q.T @ x[j]
-        saved = np.cumsum(np.sum(shares**2, axis=1))[1:]
+        shares = gram_polynomials.at_samples(size, degree).T @ y
+        squares: list[float] = np.einsum("kd,kd->k", shares, shares).tolist()
         # Schwarz's criterion: a degree too high throws the corner about.
-        dearer = np.log(size) * axes * sigma2 * np.arange(1, degree + 1)
-        best = 1 + int(np.argmax(saved - dearer))
-        c = np.linalg.solve(R[: best + 1, : best + 1], shares[: best + 1])
-        result = c[0], c[1] / size
-        left = float(np.sum((x[j] - Q[:, : best + 1] @ shares[: best + 1]) ** 2))
-        if left <= sigma2 * chdtri(axes * max(1, size - best - 1), _ANOTHER):
+        dearer = log(size) * axes * sigma2
+        saved = list(accumulate(energy - dearer for energy in squares[1:]))
+        best = 1 + saved.index(max(saved))
+        value, slope = gram_polynomials.at(size, best, at - first, 2) @ shares[: best + 1]
+        result = value, slope
+        left = float(np.vdot(y, y)) - sum(squares[: best + 1])
+        if left <= sigma2 * _squares_by_chance(axes * max(1, size - best - 1)):
             break
         size //= 2
     return result
+
+
+@lru_cache(maxsize=1 << 14)
+def _squares_by_chance(freedom: int) -> float:
+    from scipy.special import chdtri
+
+    return float(chdtri(freedom, _ANOTHER))

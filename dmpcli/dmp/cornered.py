@@ -19,6 +19,9 @@ from dmpcli.dmp.noise import ROUNDING, Noise
 
 # Samples up to which corners are looked for.
 _MOST = 50_000
+# Coefficients up to which two pieces are plain, and squares beyond those of noise, in variances,
+# that a polynomial of more leaves where no spline that does better costs as little as they.
+_PLAIN, _FAR = 6.0, 200.0
 
 
 @dataclass(frozen=True)
@@ -187,7 +190,13 @@ class _KeptPieces:
 
     def _need(self, low: float, at: float, high: float) -> float:
         """What it costs more to leave a corner out."""
-        one, before, after = self[low, high], self[low, at], self[at, high]
+        before, after = self[low, at], self[at, high]
+        plain = before is not None and after is not None and before.size + after.size <= _PLAIN
+        if plain and (low, high) not in self._kept:
+            missed = corner_pieces.missed(self._x, low, high) / self._variance
+            if missed > high - low + _FAR:
+                return np.inf
+        one = self[low, high]
         if one is None:
             return np.inf
         if before is None or after is None:

@@ -256,23 +256,32 @@ def _doubted(residual: Floats, design: Design, noise: Noise, x: Floats, first: b
     return np.asarray(np.any(squares >= candidates[found[-1]], axis=0))
 
 
-def squares(residual: Floats, sigma: float, windows: tuple[int, ...]) -> Floats:
-    """χ² of sliding means of residuals at their middles, and of peaks.
+def within(residual: Floats, sigma: float, windows: tuple[int, ...], chance: float) -> bool:
+    """Whether sliding means of a residual (n, D), and its peaks, are as small as those of noise.
 
     Parameters
     ----------
     residual : array, shape (n, D)
     sigma : float
-        Of the noise on each axis, in the unit of the residual.
+        Of the noise along each axis.
     windows : tuple of int
-        W of them, in samples, rising.
-
-    Returns
-    -------
-    array, shape (W + 1, n)
-        Of D degrees of freedom; 0 where a window does not fit. The peaks stand last.
+        Samples of the means; increasing.
+    chance : float
+        By which one of all is larger.
     """
-    return _squares(residual, sigma, 0.0, windows, len(residual))
+    from scipy.special import chdtri
+
+    count, dimensions = residual.shape
+    most = sigma**2 * float(chdtri(dimensions, chance / ((len(windows) + 1) * count)))
+    sums = np.concatenate([np.zeros((1, dimensions)), np.cumsum(residual, axis=0)])
+    for window in windows:
+        if window > count:
+            break
+        means = sums[window:] - sums[:-window]
+        if np.einsum("td,td->t", means, means).max() > most * window:
+            return False
+    peaks = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
+    return bool(np.einsum("td,td->t", peaks, peaks).max(initial=0.0) <= 1.5 * most)
 
 
 def _squares(

@@ -18,8 +18,10 @@ _ENDS = 4
 _DISTINCT = 2 * _ENDS + 1
 # Samples worked on at once, so that they stay in the processor's cache.
 _CHUNK = 1 << 14
-# Entries up to which a full matrix is faster than its bands.
-_FULL = 40_000
+# Entries up to which a full matrix is faster than its bands, and samples up to which it is to
+# copy its piece to each.
+_FULL, _COPIED = 40_000, 1 << 10
+_EACH = np.arange(DEGREE + 1)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +68,8 @@ class Design:
             return None
         A = np.zeros((self.count, self.size))
         for part, interval, basis in self.chunks():
-            rows = np.arange(part.start, part.stop)
-            A[rows[:, None], interval[:, None] + np.arange(DEGREE + 1)] = basis.T
+            first = interval + self.size * np.arange(part.start, part.stop)
+            A.reshape(-1)[first + _EACH] = basis
         return A
 
     @cached_property
@@ -75,9 +77,9 @@ class Design:
         """Lower bands of AᵀA, shape (6, K + 5)."""
         gram = np.zeros((DEGREE + 1, self.size))
         if self.full is not None:
-            product = self.full.T @ self.full
+            size, product = self.size, (self.full.T @ self.full).reshape(-1)
             for offset in range(DEGREE + 1):
-                gram[offset, : self.size - offset] = np.diagonal(product, -offset)
+                gram[offset, : size - offset] = product[offset * size :: size + 1]
             return gram
         for _, interval, basis in self.chunks():
             ids, starts = _runs(interval)
@@ -226,6 +228,8 @@ def _uniform_basis(u: Floats, intervals: int) -> tuple[Integers, Floats]:
         from_end = interval - (intervals - _DISTINCT)
         piece = np.minimum(interval, np.maximum(_ENDS, from_end))
     pieces = _pieces(min(intervals, _DISTINCT))
+    if len(u) <= _COPIED:
+        return interval, np.einsum("jin,jn->in", pieces.T[:, :, piece], powers)
     ids, starts = _runs(piece)
     basis = np.empty_like(powers)
     for i, begin, end in zip(ids, starts, np.append(starts[1:], len(u)), strict=True):

@@ -4,10 +4,11 @@ The estimate rests on the upper half of the discrete cosine spectrum, where a ha
 It is blind to noise that was filtered, interpolated or quantised on its way: such noise is
 recognised by a plateau that ends within the band, or by a lattice on which all samples lie. A
 stroke's own detail, such as handwriting, may make a plateau too: it is believed to be noise only
-where it is small against the stroke, and present all along the recording.
+where it is small against the stroke, and present all along the recording. Elsewhere it is doubted.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -70,9 +71,11 @@ class Noise:
     reach : float or None
         Frequency up to which noise of kind 'band' reaches, as part of half the sampling rate. Of
         kind 'white', that up to which there may be such noise too, which is not told from the
-        stroke since parts of the recording are without it: it is not counted.
+        stroke since it is large, or parts of the recording are without it: it is not counted.
     stroke : float or None
         Frequency from which on the noise outweighs the stroke, likewise; a cut-off to name.
+    rms : float or None
+        Root mean square, over all axes, of what fills the band up to `reach`, unit of the samples.
     step : float or None
         Step of kind 'quantised', unit of the samples.
     """
@@ -82,6 +85,7 @@ class Noise:
     kind: Kind = "white"
     reach: float | None = None
     stroke: float | None = None
+    rms: float | None = None
     step: float | None = None
 
     @property
@@ -94,7 +98,7 @@ class Noise:
         """Variance over all axes."""
         return float(np.sum(self.sigma**2))
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """Standard deviation along the noisiest axis."""
         return float(np.max(self.sigma))
@@ -165,12 +169,11 @@ def estimate(x: Floats, partial: bool = True, held: bool = False) -> Noise:
     if float(np.max(plateau)) < ROUNDING * extent:
         return Noise(axes, sigma)
     half = 0.5 * count
-    found = float(np.sum(plateau**2))
-    if not held and np.sqrt(found * (last - first) / half) > _SMALL * extent:
-        return Noise(axes, sigma)
-    if not _throughout(line, first, last, plateau):
-        return Noise(axes, sigma, reach=last / half, stroke=first / half)
-    return Noise(plateau_axes, plateau, "band", reach=last / half, stroke=first / half)
+    rms = float(np.sqrt(np.sum(plateau**2) * (last - first) / half))
+    small = held or rms <= _SMALL * extent
+    if not small or not _throughout(line, first, last, plateau):
+        return Noise(axes, sigma, reach=last / half, stroke=first / half, rms=rms)
+    return Noise(plateau_axes, plateau, "band", reach=last / half, stroke=first / half, rms=rms)
 
 
 def _detrended(x: Floats) -> Floats:

@@ -218,6 +218,12 @@ def _derivatives(knots: Floats) -> Floats:
 
 def derivatives(knots: Floats) -> Floats:
     """Derivatives 0 … 5 at the first knot, by the first six coefficients, shape (6, 6)."""
+    return _derivatives_at(tuple((knots[: 2 * DEGREE + 1] - knots[0]).tolist())).copy()
+
+
+@lru_cache(maxsize=64)
+def _derivatives_at(first: tuple[float, ...]) -> Floats:
+    knots = np.array(first)
     rows = np.zeros((DEGREE + 1, DEGREE + 1))
     level = np.eye(DEGREE + 1)
     rows[0] = level[0]

@@ -83,7 +83,7 @@ def learn(
         _reproductions([source.sha256 for source in sources], result),
         Provenance("fit", options, tuple(inputs)),
     )
-    for line in cautions(names, result):
+    for line in cautions(names, result, settings.cutoff):
         warn(line)
     return learned_skill.read(Source("skill", content)), result
 

@@ -132,8 +132,17 @@ def _wave(r: "ReproductionMeasures") -> tuple[float, float] | None:
     return None if there is None or here is None else (there, here)
 
 
-def cautions(names: Sequence[str], result: "Fit") -> Iterator[str]:
-    """Yield a line for all that is doubtful of a fit, each with its remedy."""
+def cautions(names: Sequence[str], result: "Fit", cutoff: float | None = None) -> Iterator[str]:
+    """Yield a line for all that is doubtful of a fit, each with its remedy.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the recordings.
+    result : Fit
+    cutoff : float, optional
+        That was asked for, Hz.
+    """
     if result.skill.learning == "paper":
         yield from _of_paper(names, result)
         return
@@ -141,7 +150,7 @@ def cautions(names: Sequence[str], result: "Fit") -> Iterator[str]:
     for i, (name, prepared) in enumerate(zip(names, result.prepared, strict=True)):
         assert prepared.seen is not None
         yield from _of_recording(name, prepared.seen)
-        yield from _of_noise(name, prepared.seen, result.skill)
+        yield from _of_noise(name, prepared.seen, result.skill, cutoff)
         if not any(rest.left_out and rest.index == i for rest in rests):
             yield from _of_pauses(name, prepared.seen)
     if result.plane is not None:
@@ -185,15 +194,24 @@ def _of_recording(name: str, seen: "Preprocessed") -> Iterator[str]:
         )
 
 
-def _of_noise(name: str, seen: "Preprocessed", skill: "Skill") -> Iterator[str]:
+def _of_noise(
+    name: str, seen: "Preprocessed", skill: "Skill", cutoff: float | None
+) -> Iterator[str]:
     noise = seen.position.noise
+    up_to = (noise.reach or 1.0) * seen.half_rate
+    faint = 0.0 if skill.reached is None else _FAINT * skill.reached.tolerance
+    if cutoff is not None and cutoff < up_to:
+        # As asked, whatever it is.
+        return
     if noise.doubted:
-        yield (
-            f"{name}: what reaches up to {(noise.reach or 1.0) * seen.half_rate:.3g} Hz looks like "
-            "filtered noise in a part of the recording only, and is kept as the stroke's own; "
-            f"--cutoff {_round(seen)} smooths it"
-        )
-    if skill.reached is None or noise.typical < _FAINT * skill.reached.tolerance:
+        if (noise.rms or 0.0) >= faint:
+            yield (
+                f"{name}: what fills the band up to {up_to:.3g} Hz, RMS {noise.rms:.2g} mm, is "
+                f"kept as the stroke's own; if it is filtered noise, --cutoff {_round(seen)} "
+                "smooths it"
+            )
+        return
+    if skill.reached is None or noise.typical < faint:
         return
     if noise.kind == "quantised":
         yield (
@@ -203,8 +221,8 @@ def _of_noise(name: str, seen: "Preprocessed", skill: "Skill") -> Iterator[str]:
     elif noise.kind == "band":
         yield (
             f"{name}: noise was filtered or interpolated before it was recorded, up to "
-            f"{(noise.reach or 1.0) * seen.half_rate:.3g} Hz, and cannot be told from the stroke "
-            f"there; --cutoff {_round(seen)} smooths it"
+            f"{up_to:.3g} Hz, and cannot be told from the stroke there; "
+            f"--cutoff {_round(seen)} smooths it"
         )
 
 

@@ -12,12 +12,15 @@ from dmpcli.metrics.deviation import nearest_distance
 from dmpcli.metrics.wave_height import stroke_wave
 from dmpcli.records import file_io, record
 from tests import cases
+from tests.dmp import recordings
 from tests.records import meshes
 from tests.surfaces import fields
 
 UP = np.array([0.0, 0.0, 1.0])
 PATH = cases.wave(np.linspace(0.0, 1.0, 6001))
 """What most recordings draw: 300 mm along x, a wave of 50 mm."""
+WAVE = cases.wave(cases.U6)
+"""Likewise, at the times of their samples."""
 WALL = {"point": [0, 0, 0], "normal": [0, -1, 0]}
 PLATE = {"point": [0, 0, 0], "normal": [0, 0, 1]}
 
@@ -348,6 +351,72 @@ def test_noise_of_part_of_the_band_is_told_and_its_remedy_smooths(lab, made):
     inner = len(acceleration) // 20
     assert np.linalg.norm(acceleration, axis=1)[inner:-inner].max() <= 1.5 * 84.0
     assert deviation(position, PATH)[0] <= 0.3
+
+
+def _told_of_the_band(said):
+    """Frequency, RMS and cut-off of the one line that tells what fills a part of the band."""
+    words = (
+        r"what fills the band up to (\S+) Hz, RMS (\S+) mm, is kept .* --cutoff (\S+) smooths it"
+    )
+    [line] = [line for line in warnings(said) if "the band" in line]
+    return map(float, re.search(words, line).groups())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize("frequency", [5.0, 8.0])
+def test_filtered_noise_too_large_to_be_believed_is_kept_and_told(lab, frequency, seed):
+    """Of 1 % of the extent and more, as handwriting is."""
+    table = cases.filtered(12.0, frequency, np.random.default_rng(seed))
+    _, said = lab.fit("large", tables=[table])
+    up_to, rms, cutoff = _told_of_the_band(said)
+    # Within half an octave of where the filter, run twice, passes a half.
+    assert 0.7 * frequency <= up_to <= 1.5 * frequency
+    noise = table[:, 1:4] - WAVE
+    assert rms == pytest.approx(np.sqrt(np.mean(np.sum(noise**2, axis=1))), rel=0.5)
+    skill, said = lab.fit("large", "--cutoff", cutoff, tables=[table])
+    assert "the band" not in said
+    drawn, _ = lab.draw(skill, "--reproduce")
+    step = np.diff(drawn.position(), axis=0)
+    rough = np.diff(table[:, 1:4], axis=0)
+    assert np.linalg.norm(step, axis=1).sum() <= 0.8 * np.linalg.norm(rough, axis=1).sum()
+
+
+@pytest.mark.parametrize("there", [slice(0, 400), slice(200, None)])
+def test_filtered_noise_of_a_part_of_the_recording_is_kept_and_told(lab, there):
+    noise = np.zeros((601, 3))
+    rng = np.random.default_rng(4)
+    noise[there] = (cases.filtered(0.5, 10.0, rng)[:, 1:4] - WAVE)[there]
+    noise += rng.normal(0.0, 0.005, noise.shape)
+    table = np.column_stack([cases.T6, WAVE + noise])
+    skill, said = lab.fit(f"part{there.start}", tables=[table])
+    up_to, rms, cutoff = _told_of_the_band(said)
+    assert 8.0 <= up_to <= 20.0
+    assert 0.1 <= rms <= 0.5
+    assert cutoff < up_to
+    drawn, _ = lab.draw(skill, "--reproduce")
+    assert deviation(table[:, 1:4], drawn.position())[0] <= 0.1
+    _, said = lab.fit(f"part{there.start}", "--cutoff", cutoff, tables=[table])
+    assert "the band" not in said
+    # Above the noise it smooths nothing of it.
+    _, said = lab.fit(f"part{there.start}", "--cutoff", 40, tables=[table])
+    assert "the band" in said
+
+
+def test_irregular_handwriting_that_fills_a_band_is_kept_and_told(lab):
+    """Its spectrum is that of filtered noise: only who wrote it knows."""
+    t, points = recordings.handwriting_and_lines(15, glyphs=40)
+    points = recordings.noisy(points, 0.05, 15)
+    skill, said = lab.fit("written", tables=[np.column_stack([t, points])])
+    assert _told_of_the_band(said)
+    drawn, _ = lab.draw(skill, "--reproduce")
+    assert deviation(points, drawn.position())[0] <= 0.15
+
+
+@pytest.mark.parametrize("name", ["letters", "corners", "pen_lift", "seam"])
+def test_what_no_stroke_lacks_is_not_told_of_its_band(lab, name):
+    _, said = lab.fit(name, tables=[getattr(cases, name)()])
+    assert "the band" not in said
 
 
 # Parts of a recording that belong to no stroke.
