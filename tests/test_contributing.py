@@ -83,11 +83,21 @@ def test_the_layout_reads_its_recordings(tmp_path, monkeypatch):
     np.testing.assert_allclose(demo.t, t, atol=1e-9)
 
 
-def test_the_hooks_are_the_checks_of_make_lint():
+def test_the_hooks_are_the_checks_of_make_lint_and_make_test_and_ci_run_them():
     entries = re.findall(r"entry: \.venv/bin/(.+)", (ROOT / ".pre-commit-config.yaml").read_text())
-    rule = (ROOT / "Makefile").read_text().split("\nlint:")[1].split("\n\n")[0]
-    lint = [line.strip().removeprefix("$(BIN)/") for line in rule.splitlines()[1:]]
+    makefile = (ROOT / "Makefile").read_text()
+
+    def rule(target):
+        return makefile.split(f"\n{target}:")[1].split("\n\n")[0]
+
+    parts = rule("lint").split()
+    assert parts == ["rules", "types"]
+    recipes = [line for part in parts for line in rule(part).splitlines()[1:]]
+    lint = [line.strip().removeprefix("$(BIN)/") for line in recipes]
     assert entries == [re.sub(r" --cache-dir.*", "", line) for line in lint]
+    # Rules are looked at by make test, and types beside it.
+    assert " rules > " in rule("test")
+    assert 'types "PYTHON=$default"' in (ROOT / ".ci" / "run").read_text()
 
 
 def test_every_file_that_the_page_names_is_there():
