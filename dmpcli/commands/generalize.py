@@ -192,8 +192,8 @@ def _with_means(
     rows = 1 if table is None else len(table) if stream is None else stream.rows
     mesh = read is not None and isinstance(read.surface, TriangleMesh)
     if table is not None and table.places is not None:
-        # Each surface wants its facets made ready.
-        mesh = len(table) >= kernels.MANY_ON_EACH * len(table.places.places)
+        # What a surface is its file tells, which is read where it is drawn on.
+        mesh = not all(place.surface.lower().endswith(".json") for place in table.places.places)
     turning = settings.orientation == "surface" or settings.inclination is not None
     means = kernels.means(settings.kernels, rows, mesh, turning, output)
     if means == "compiled":

@@ -51,10 +51,13 @@ class MeshStore:
         Without one only the last meshes are held, for their next pose.
     largest : int
         Bytes.
+    kernels : bool
+        Whether meshes are for kernels: the order of their search trees is kept too.
     """
 
     folder: str | None = None
     largest: int = LARGEST
+    kernels: bool = False
     _held: dict[tuple[str, str | None], MeshFile] = field(default_factory=dict, repr=False)
     _written: int = field(default=0, repr=False)
 
@@ -89,6 +92,8 @@ class MeshStore:
         if entry is not None:
             kept = _kept(entry)
             if kept is not None:
+                if self.kernels and not kept[1].knows_order:
+                    self._keep(entry, *kept)
                 with contextlib.suppress(OSError):
                     os.utime(entry)
                 return kept
@@ -127,7 +132,7 @@ class MeshStore:
             temporary, stream = file_io.temporary_of(entry)
             try:
                 with stream:
-                    np.savez(stream, **_packed(found, mesh.topology.adjacency))  # type: ignore[arg-type]
+                    np.savez(stream, **_packed(found, mesh, self.kernels))  # type: ignore[arg-type]
                 temporary.replace(entry)
             finally:
                 temporary.unlink(missing_ok=True)
@@ -159,8 +164,9 @@ def _igl_version() -> str:
     return version("libigl")
 
 
-def _packed(found: MeshFile, adjacency: Adjacency) -> dict[str, AnyArray]:
+def _packed(found: MeshFile, mesh: Mesh, kernels: bool) -> dict[str, AnyArray]:
     """Return the arrays of an entry: numbers of vertices and faces in four bytes each."""
+    adjacency = mesh.topology.adjacency
     packed: dict[str, AnyArray] = {
         "V": found.V,
         "F": found.F.astype(np.int32),
@@ -169,6 +175,8 @@ def _packed(found: MeshFile, adjacency: Adjacency) -> dict[str, AnyArray]:
     }
     if adjacency.components.any():
         packed["components"] = adjacency.components.astype(np.int32)
+    if kernels:
+        packed |= mesh.tree_order._asdict()
     return packed
 
 
@@ -182,9 +190,12 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
         components = np.zeros(len(F), dtype=np.int64) if pieces is None else _whole(pieces)
         adjacency = Adjacency(_whole(held["neighbours"]), components)
         remarks = json.loads(held["remarks"].tobytes())
+        mesh = Mesh(V, F, adjacency)
+        if "order" in held:
+            mesh.know_order(held["order"], held["first"])
     except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
         return None
-    return MeshFile(V, F, remarks, adjacency), Mesh(V, F, adjacency)
+    return MeshFile(V, F, remarks, adjacency), mesh
 
 
 def _whole(values: AnyArray) -> Integers:

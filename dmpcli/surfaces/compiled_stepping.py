@@ -51,7 +51,10 @@ def start(
 
     ahead, behind = front(1.0), front(-1.0)
     doubt = np.zeros(len(position), dtype=bool)
-    stepping.start(mesh.facets, _limits(), _walks(ahead), _walks(behind), doubt)
+    walks = mesh.for_kernels.facets, _limits(), _walks(ahead), _walks(behind), doubt
+    stepping.start(*walks)
+    while mesh.made_known(doubt):
+        stepping.start(*walks)
     rows = np.flatnonzero(doubt)
     if len(rows):
         places = position[rows], normal[rows], direction[rows]
@@ -82,7 +85,15 @@ def walk(mesh: TriangleMesh, front: Front, steps: Integers) -> tuple[Booleans, B
     from dmpcli.surfaces.kernels import stepping
 
     sharp, off, doubt = np.zeros((3, len(steps)), dtype=bool)
-    stepping.ends(mesh.facets, _limits(), _walks(front), steps, sharp, off, doubt)
+    stepping.ends(mesh.for_kernels.facets, _limits(), _walks(front), steps, sharp, off, doubt)
+    if mesh.made_known(doubt):
+        # These stand where they began; the others are not walked twice.
+        rows = np.flatnonzero(doubt)
+        again = front.rows(rows)
+        sharp[rows], off[rows], still = walk(mesh, again, steps[rows])
+        for name in ("position", "direction", "normal"):
+            getattr(front, name)[rows] = getattr(again, name)
+        return sharp, off, rows[still]
     return sharp, off, np.flatnonzero(doubt)
 
 
@@ -112,7 +123,11 @@ def walk_lines(
     from dmpcli.surfaces.kernels import stepping
 
     where, doubt = stepping.NodeArrays(*out), np.zeros(len(rows[0]), dtype=bool)
-    stepping.lines(mesh.facets, _limits(), _walks(front), *rows, *nodes, where, doubt)
+    walks = mesh.for_kernels.facets, _limits(), _walks(front), *rows, *nodes, where, doubt
+    stepping.lines(*walks)
+    while mesh.made_known(doubt):
+        doubt[:] = False
+        stepping.lines(*walks)
     return doubt
 
 

@@ -1,7 +1,7 @@
 """Geodesics from A to B: shoot, see by how much the goal is missed, correct heading and length."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from dmpcli.surfaces import (
     straightest_geodesics,
 )
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
+from dmpcli.surfaces.walked_course import Course
 
 # Steps of the centre line are no longer than this, mm, and there are at least four.
 STEP = 6.5
@@ -75,7 +76,8 @@ class Aim:
 class Ends:
     """Where B shots came out: position, direction, normal (B, 3), and what they met (B,).
 
-    `sharp` tells of a crease, `off` that a shot left the mesh, if only for a while.
+    `sharp` tells of a crease, `off` that a shot left the mesh, if only for a while. Of shots along
+    the smooth normal `course` has the nodes, where they are kept.
     """
 
     position: Floats
@@ -83,13 +85,14 @@ class Ends:
     normal: Floats
     sharp: Booleans
     off: Booleans
+    course: Course | None = None
 
     @classmethod
-    def unknown(cls, count: int) -> "Ends":
-        """Return ends to be filled in."""
+    def unknown(cls, count: int, nodes: int = 0) -> "Ends":
+        """Return ends to be filled in, with so many nodes of their courses."""
         a, b, c = np.zeros((3, count, 3))
         sharp, off = np.zeros((2, count), dtype=bool)
-        return cls(a, b, c, sharp, off)
+        return cls(a, b, c, sharp, off, Course.unknown(count, nodes) if nodes else None)
 
     def fill(self, rows: Integers, other: "Ends", which: Booleans) -> None:
         """Put some rows of other ends into these.
@@ -102,8 +105,10 @@ class Ends:
         which : array of bool, shape (rows of `other`,)
             True for k of them, in the order of `rows`.
         """
-        for field in fields(self):
-            getattr(self, field.name)[rows] = getattr(other, field.name)[which]
+        for name in ("position", "direction", "normal", "sharp", "off"):
+            getattr(self, name)[rows] = getattr(other, name)[which]
+        if self.course is not None:
+            self.course.fill(rows, other.course, which)
 
 
 Shot = Callable[[TriangleMesh, Aim], Ends]
@@ -129,23 +134,30 @@ def by_steps(mesh: TriangleMesh, aim: Aim) -> Ends:
             again = _walked(mesh, front.rows(doubtful), aim.steps[doubtful])
             ends.fill(doubtful, again, np.ones(len(doubtful), dtype=bool))
         return ends
-    front, _ = geodesic_stepping.start(mesh, *begun)
-    return _walked(mesh, front, aim.steps)
+    front, behind = geodesic_stepping.start(mesh, *begun)
+    return _walked(mesh, front, aim.steps, Course.begun(front, behind, aim.steps))
 
 
-def _walked(mesh: TriangleMesh, front: geodesic_stepping.Front, steps: Integers) -> Ends:
-    ends = Ends.unknown(len(steps))
+def _walked(
+    mesh: TriangleMesh,
+    front: geodesic_stepping.Front,
+    steps: Integers,
+    course: Course | None = None,
+) -> Ends:
+    ends = replace(Ends.unknown(len(steps)), course=course)
     sharp, off = ends.sharp.copy(), ends.off.copy()
     active = np.arange(len(steps))
     for number in range(1, int(steps.max(initial=0)) + 1):
         front, marks = geodesic_stepping.advance(mesh, front)
         sharp[active] |= marks.sharp
         off[active] |= marks.off
+        if course is not None:
+            course.add(active, number - 1, front, marks)
         done = steps[active] == number
         if done.any():
             rows = active[done]
             here = Ends(front.position, front.direction, front.normal, sharp[active], off[active])
-            ends.fill(rows, here, done)
+            replace(ends, course=None).fill(rows, here, done)
             front, active = front.rows(~done), active[~done]
     return ends
 
@@ -207,7 +219,8 @@ def _corrected(
     count = len(aim.steps)
     best = aim.rows(np.arange(count))
     miss = np.full(count, np.inf)
-    ends = Ends.unknown(count)
+    kept = shot is by_steps and not mesh.compiled
+    ends = Ends.unknown(count, int(aim.steps.max(initial=0)) if kept else 0)
     active = np.arange(count)
     trial = best.rows(active)
     lever, turn, side = trial.length.copy(), np.zeros((count, 1)), np.zeros((count, 1))

@@ -54,6 +54,11 @@ class LocalShape:
     ----------
     whole : MeshShape
         What is asked where it is not worth while to cut.
+
+    Attributes
+    ----------
+    expecting : bool
+        Whether it was said where faces will be asked for.
     """
 
     def __init__(self, whole: MeshShape) -> None:
@@ -62,6 +67,7 @@ class LocalShape:
         self._all = False
         self._lines: list[tuple[Floats, Floats, float]] = []
         self._box: tuple[Floats, Floats] | None = None
+        self.expecting = False
 
     def use_whole(self) -> None:
         """Cut no more: the shape of all faces is known, or soon will be."""
@@ -77,6 +83,10 @@ class LocalShape:
         beside : float
             How far from them, mm.
         """
+        self.expecting = True
+        self._also(start, goal, beside)
+
+    def _also(self, start: Floats, goal: Floats, beside: float) -> None:
         finite = np.isfinite(start).all(axis=1) & np.isfinite(goal).all(axis=1)
         start, goal = start[finite], goal[finite]
         if self._box is None and len(self._lines) + len(start) <= _LINES:
@@ -98,6 +108,27 @@ class LocalShape:
             self._grow(face)
         return self._whole, face
 
+    def known(self) -> tuple[MeshShape, Integers, Integers, Booleans]:
+        """Return what is known by now.
+
+        Returns
+        -------
+        MeshShape
+        faces, at : array of int, shape (k,)
+            Faces that are known, and their numbers in the shape.
+        inner : array of bool, shape (k,)
+            Those about whose vertices all faces are known.
+        """
+        every = np.arange(len(self._whole.F))
+        if self._all:
+            return self._whole, every, every, np.ones(len(every), dtype=bool)
+        number = np.full(len(every), -1) if self._patch is None else self._patch.number
+        faces = np.flatnonzero(number >= 0)
+        rim = np.zeros(len(self._whole.V), dtype=bool)
+        rim[self._whole.F[number < 0]] = True
+        shape = self._whole if self._patch is None else self._patch.shape
+        return shape, faces, number[faces], ~rim[self._whole.F[faces]].any(axis=1)
+
     def _grow(self, face: Integers) -> None:
         """Cut out a larger patch, about these faces too."""
         V, F = self._whole.V, self._whole.F
@@ -109,7 +140,7 @@ class LocalShape:
             edge = np.linalg.norm(V[inside[:, 1]] - V[inside[:, 0]], axis=1).mean()
             inside = off <= _WIDER * (_OF_NORMALS + 1) * edge
         else:
-            self.expect(asked, asked, 0.0)
+            self._also(asked, asked, 0.0)
             off = self._off(at)
             before = 0 if self._patch is None else self._patch.size
             wanted = min(max(_LEAST, _TIMES * before), len(F) - 1)

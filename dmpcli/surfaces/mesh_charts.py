@@ -20,6 +20,7 @@ from dmpcli.surfaces.sampled_chart import closed_direction, goal_coordinates, wa
 from dmpcli.surfaces.strip_grid import Centre
 from dmpcli.surfaces.surface import ChartImage, Geodesics, Status, first_refusal, towards
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
+from dmpcli.surfaces.walked_course import Course
 
 # Start and goal nearer to each other than this have no direction, mm.
 COINCIDENT = 1e-6
@@ -317,14 +318,17 @@ def mesh_charts(
         ends = centre.origin[around], b.position[around], b.distance[around]
         thin = thin_walls.mistaken(mesh, *ends, link.length[around])
         status[around[thin]] = Status.OTHER_SIDE
-    centre = Centre(a.position, normal, link.direction, link.step, sign, part)
+    centre = Centre(a.position, normal, link.direction, link.step, sign, part, link.course)
     goals = np.stack([link.length, 0.0 * link.length, 0.0 * link.length], axis=-1)
     return MeshCharts(mesh, centre, b.position, link.length, goals, status, link.creased)
 
 
 @dataclass(frozen=True)
 class Link:
-    """Geodesics found: e_u at the start, normal at the goal, step of the nodes, length, mm."""
+    """Geodesics found: e_u at the start, normal at the goal, step of the nodes, length, mm.
+
+    And what was walked of them, if all were.
+    """
 
     direction: Floats
     normal: Floats
@@ -332,6 +336,7 @@ class Link:
     length: Floats
     status: Integers
     creased: Booleans
+    course: Course | None = None
 
 
 def connect(mesh: TriangleMesh, centre: Centre, goal: Floats, status: Integers) -> Link:
@@ -377,7 +382,8 @@ def connect(mesh: TriangleMesh, centre: Centre, goal: Floats, status: Integers) 
     direction[rows], normal[rows] = aim.direction, ends.normal
     lengths[rows], step[rows] = aim.length[:, 0], aim.length / aim.steps[:, None]
     status[rows] = np.where(good, Status.DRAWN, Status.NO_GEODESIC)
-    return Link(direction, normal, step, lengths, status, creased)
+    course = ends.course if len(rows) == count else None
+    return Link(direction, normal, step, lengths, status, creased, course)
 
 
 def _landed(mesh: TriangleMesh, first: Aim, aim: Aim, ends: geodesic_shooting.Ends) -> Booleans:

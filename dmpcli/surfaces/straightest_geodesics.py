@@ -86,7 +86,7 @@ def _run(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Boolean
 def _run_compiled(mesh: TriangleMesh, state: GeodesicState, remaining: Floats) -> Booleans:
     from dmpcli.surfaces.kernels import facet_walks, tree
 
-    facets, order = mesh.facets, mesh.for_kernels.rows
+    facets, order = mesh.for_kernels.facets, mesh.for_kernels.rows
     rows = order[state.face]
     walks = state.position, state.heading, rows, remaining
     arrived = facet_walks.run(facets.reals, facets.numbers, *walks, MOST_FACETS)

@@ -290,8 +290,8 @@ def _feet_compiled(
     foot, e_v, normal, point, slope = (np.empty((*shape, 3)) for _ in range(5))
     beyond, far, back, doubt = np.empty((4, *shape), dtype=bool)
     feet = _Feet(foot, e_v, normal, np.empty(shape, np.int64), np.empty(shape), beyond, far, back)
-    samples.lift(
-        mesh.facets,
+    given = (
+        mesh.for_kernels.facets,
         samples.StripNodes(nodes.values, nodes.normal, nodes.stretch, nodes.away),
         along,
         aside,
@@ -302,6 +302,9 @@ def _feet_compiled(
             foot, e_v, normal, feet.face, feet.stretch, beyond, far, back, doubt, point, slope
         ),
     )
+    samples.lift(*given)
+    while mesh.made_known(doubt):
+        samples.lift(*given)
     pair, k = np.nonzero(doubt)
     if len(pair):
         u, v = along[pair, k, None], aside[pair, k, None]

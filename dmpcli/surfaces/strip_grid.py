@@ -1,5 +1,6 @@
 """The nodes of strip charts: a grid walked along and across the geodesics from start to goal."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, unit
 from dmpcli.surfaces import compiled_stepping, geodesic_stepping
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
+from dmpcli.surfaces.walked_course import Course
 
 # Central fourth-order differences, and their one-sided forms for the two nodes at either end.
 _SLOPES = (
@@ -36,6 +38,8 @@ class Centre:
         Of the nodes along u, mm.
     sign : array, shape (B, 1)
     part : array of int, shape (B,)
+    course : Course, optional
+        Nodes ahead that were walked to find the goal.
     """
 
     origin: Floats
@@ -44,6 +48,7 @@ class Centre:
     step: Floats
     sign: Floats
     part: Integers
+    course: Course | None = None
 
     def rows(self, rows: Integers) -> "Centre":
         """Return some of the charts."""
@@ -54,6 +59,7 @@ class Centre:
             self.step[rows],
             self.sign[rows],
             self.part[rows],
+            None if self.course is None else self.course.rows(rows),
         )
 
 
@@ -139,7 +145,11 @@ class CentreLines:
         zero = int(behind.max(initial=0))
         along = _Lines(len(behind), zero + int(ahead.max(initial=0)) + 1)
         along.set(zero, centre.origin, centre.direction, centre.normal)
-        along.walk(mesh, zero, (ahead, behind), centre.step, centre.sign, centre.part)
+        course = centre.course
+        if course is not None and course.begin_as(centre.direction, centre.step):
+            along.follow(mesh, zero, (ahead, behind), centre, course)
+        else:
+            along.walk(mesh, zero, (ahead, behind), centre.step, centre.sign, centre.part)
         return cls(along, behind, ahead, zero)
 
     @property
@@ -324,37 +334,85 @@ class _Lines:
             sign[rows],
             part[rows],
         )
+        walks = []
         for way, front, count in zip((1, -1), fronts, counts, strict=True):
             if source is not None and len(rows) == len(source):
                 _borrow_trends(front, source)
-            self._fill(mesh, front, rows, at, way, count)
+            some = rows
+            if mesh.compiled:
+                out = self.position, self.direction, self.normal, self.away, self.sharp, self.back
+                doubt = compiled_stepping.walk_lines(mesh, front, (rows, count), (at, way), out)
+                front, some = front.rows(doubt), rows[doubt]
+            walks.append(_Walks(way, front, some, count[some], np.full(len(some), at)))
+        self._fill(mesh, walks)
 
-    def _fill(
+    def follow(
         self,
         mesh: TriangleMesh,
-        front: geodesic_stepping.Front,
-        rows: Integers,
         at: int,
-        way: int,
-        count: Integers,
+        counts: tuple[Integers, Integers],
+        centre: Centre,
+        course: Course,
     ) -> None:
-        if mesh.compiled:
-            out = self.position, self.direction, self.normal, self.away, self.sharp, self.back
-            doubt = compiled_stepping.walk_lines(mesh, front, (rows, count), (at, way), out)
-            if not doubt.any():
-                return
-            front, rows = front.rows(doubt), rows[doubt]
+        """Fill nodes as `walk` does, those ahead with what was walked before as far as it goes."""
+        ahead, behind = counts
+        nodes = min(int(ahead.max(initial=0)), course.away.shape[1])
+        known = np.arange(1, nodes + 1) <= np.minimum(ahead, course.count)[:, None]
+        for name in ("position", "direction", "normal", "away", "sharp", "back"):
+            mine = getattr(self, name)[:, at + 1 : at + 1 + nodes]
+            mine[known] = getattr(course, name)[:, :nodes][known]
+        on, back = np.flatnonzero(ahead > course.count), np.flatnonzero(behind > 0)
+        begin = geodesic_stepping.Front(
+            centre.origin,
+            -centre.direction,
+            centre.normal,
+            course.behind_before,
+            centre.step,
+            centre.sign,
+            centre.part,
+            course.behind_trend,
+            np.zeros(len(behind)),
+        )
+        end, done = course.end(on, centre.sign, centre.part), course.count[on]
+        self._fill(
+            mesh,
+            (
+                _Walks(1, end, on, ahead[on] - done, at + done),
+                _Walks(-1, begin.rows(back), back, behind[back], np.full(len(back), at)),
+            ),
+        )
+
+    def _fill(self, mesh: TriangleMesh, walks: "Sequence[_Walks]") -> None:
+        """Walk all of them at once, for a step costs by its calls."""
+        front = geodesic_stepping.Front.joined([one.front for one in walks])
+        way = np.concatenate([np.full(len(one.rows), one.way) for one in walks])
+        rows, count, at = (
+            np.concatenate([getattr(one, name) for one in walks])
+            for name in ("rows", "count", "at")
+        )
         for k in range(1, int(count.max(initial=0)) + 1):
-            on = count[rows] >= k
+            on = count >= k
             if not on.all():
-                front, rows = front.rows(on), rows[on]
+                front, rows, way = front.rows(on), rows[on], way[on]
+                count, at = count[on], at[on]
             front, marks = geodesic_stepping.advance(mesh, front)
             node = at + way * k
             self.position[rows, node] = front.position
-            self.direction[rows, node] = way * front.direction
+            self.direction[rows, node] = way[:, None] * front.direction
             self.normal[rows, node] = front.normal
             self.away[rows, node] = front.away
             self.sharp[rows, node], self.back[rows, node] = marks.sharp, marks.back
+
+
+@dataclass(frozen=True)
+class _Walks:
+    """Walks of some rows this way (1) or that (-1): `count` nodes on from node `at` of each."""
+
+    way: int
+    front: geodesic_stepping.Front
+    rows: Integers
+    count: Integers
+    at: Integers
 
 
 def _borrow_trends(front: geodesic_stepping.Front, source: Integers) -> None:

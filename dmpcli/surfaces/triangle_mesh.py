@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Halves, Integers
 from dmpcli.spatial.vectors import cross, dot, length, unit
 from dmpcli.surfaces.closest_facets import ClosestFacets
 from dmpcli.surfaces.local_shape import LocalShape
@@ -15,7 +15,7 @@ from dmpcli.surfaces.topology import Adjacency, Topology, places
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.kernels.mesh import Compiled
-    from dmpcli.surfaces.kernels.tree import Facets
+    from dmpcli.surfaces.kernels.tree import Facets, TreeOrder
     from dmpcli.surfaces.slits import Slits
 
 _FEW = 8
@@ -57,9 +57,14 @@ class TriangleMesh:
     compiled = False
     """Whether strokes are carried by kernels, see `with_kernels`."""
 
-    @cached_property
+    @property
     def with_kernels(self) -> Self:
         """The same mesh, on which compiled kernels walk: quicker, and the same but for rounding."""
+        # It does not hold itself: it goes as soon as nobody else does.
+        return self if self.compiled else self._compiled_twin
+
+    @cached_property
+    def _compiled_twin(self) -> Self:
         twin = type(self)(self.V, self.F)
         vars(twin).update(vars(self))
         vars(twin).pop("_recent", None)  # found by other means
@@ -68,29 +73,73 @@ class TriangleMesh:
 
     @property
     def facets(self) -> "Facets":
-        """The facets as kernels want them."""
+        """The facets as kernels want them, with the shape of all."""
+        if self.for_kernels.unknown:
+            self._local.use_whole()
+            self._tell_kernels(self.for_kernels)
         return self.for_kernels.facets
 
     @cached_property
     def for_kernels(self) -> "Compiled":
-        """What kernels work on."""
-        from dmpcli.surfaces.kernels.mesh import Geometry, compiled
+        """What kernels work on: facets, of which some may not know their shape yet."""
+        from dmpcli.surfaces.kernels.mesh import Compiled, Geometry
 
         shape, topology = self.shape, self.topology
-        self._local.use_whole()
-        return compiled(
+        if not self._local.expecting:
+            self._local.use_whole()
+        made = Compiled(
             Geometry(
+                self.V,
                 self.F,
                 shape.corners,
                 shape.face_normals,
-                shape.corner_normals,
-                shape.reach,
                 self.components,
                 topology.neighbours,
-                topology.border,
                 topology.border_vertices,
-            )
+            ),
+            self.tree_order,
         )
+        self._tell_kernels(made)
+        return made
+
+    @cached_property
+    def tree_order(self) -> "TreeOrder":
+        """Order of the facets in the kernels' search tree, which a store may keep."""
+        from dmpcli.surfaces.kernels import tree
+
+        if self._known_order is not None:
+            return tree.TreeOrder(*self._known_order)
+        return tree.TreeOrder.of(self.shape.corners)
+
+    _known_order: "tuple[Halves, Halves] | None" = None
+
+    @property
+    def knows_order(self) -> bool:
+        """Whether the order is known without looking for it."""
+        return self._known_order is not None or "tree_order" in vars(self)
+
+    def know_order(self, order: Halves, first: Halves) -> None:
+        """Take what `tree_order` was before for what it would be."""
+        self._known_order = order, first
+
+    def _tell_kernels(self, kernels: "Compiled") -> None:
+        """Tell kernels all that is known of the faces' shape."""
+        shape, faces, at, inner = self._local.known()
+        if len(faces):
+            kernels.learn(faces, shape.corner_normals[at], shape.reach[at], inner)
+
+    def made_known(self, doubt: Booleans) -> bool:
+        """Tell whether kernels that left doubt asked for shapes, known now, and must run again."""
+        if not self.for_kernels.unknown or not doubt.any():
+            return False
+        asked = self.for_kernels.asked()
+        if len(asked) == 0:
+            return False
+        near = np.zeros(len(self.V), dtype=bool)
+        near[self.F[asked]] = True
+        self._local.about(np.flatnonzero(near[self.F].any(axis=1)))
+        self._tell_kernels(self.for_kernels)
+        return True
 
     @cached_property
     def _facets(self) -> ClosestFacets:
@@ -224,7 +273,10 @@ class TriangleMesh:
             return self._facets.search(points)
         from dmpcli.surfaces.kernels import tree
 
-        foot, face, doubt = tree.search(self.facets, np.ascontiguousarray(points))
+        points = np.ascontiguousarray(points)
+        foot, face, doubt = tree.search(self.for_kernels.facets, points)
+        while self.made_known(doubt):
+            foot, face, doubt = tree.search(self.for_kernels.facets, points)
         if doubt.any():
             foot[doubt], face[doubt] = self._facets.search(points[doubt])
         return foot, face

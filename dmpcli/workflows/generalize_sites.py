@@ -124,7 +124,7 @@ def prepared_sites(
         order.on_border,
         order.keep_out,
         reach,
-        SurfaceReader(store_in(cache)),
+        SurfaceReader(store_in(cache, settings.compiled)),
     )
     return Ready(
         Task(skill.plain(), None, settings.style(), reach, asked_events(settings)),
@@ -309,7 +309,10 @@ class SiteWork:
         with heard() as told:
             if site.axes == "part":
                 table = in_base(table, read)
-            given = facing_tool(read.surface, skill, table, name)
+            surface = read.surface
+            if settings.compiled and isinstance(surface, Mesh):
+                surface = surface.with_kernels
+            given = facing_tool(surface, skill, table, name)
             style = style_of(settings.style(), skill, given, settings.contact, site.offset)
             style = process.process_style(style, settings, self.on_border, given, self.keep_out, [])
             tell_of_surface(skill, style, given, table, name)

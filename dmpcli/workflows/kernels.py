@@ -20,10 +20,7 @@ from dmpcli.records import file_io, parquet, record
 from dmpcli.records.storage import Location
 
 MANY_ON_MESH = 1000
-"""Rows from which kernels bring more than loading them costs, on meshes ..."""
-
-MANY_ON_EACH = 100
-"""... and on each, in the mean, where a table names them: its facets must be made ready ..."""
+"""Rows from which kernels bring more than loading them costs, on meshes, one or many ..."""
 
 MANY = 30_000
 """... and on other surfaces, where only the tool's turn is theirs."""

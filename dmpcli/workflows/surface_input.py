@@ -132,11 +132,11 @@ def read(
     return placed_input(source, pose, placed, unit, store=store, summary=summary)
 
 
-def store_in(folder: Path | None) -> "MeshStore":
-    """Return what reads surfaces, and keeps prepared meshes in a folder where one is named."""
+def store_in(folder: Path | None, kernels: bool = False) -> "MeshStore":
+    """Return what reads surfaces, and keeps prepared meshes, for kernels or not, in a folder."""
     from dmpcli.records.mesh_store import MeshStore
 
-    return MeshStore(None if folder is None else str(folder.absolute()))
+    return MeshStore(None if folder is None else str(folder.absolute()), kernels=kernels)
 
 
 def placed_input(

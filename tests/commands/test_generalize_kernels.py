@@ -88,6 +88,36 @@ def test_a_job_that_goes_on_keeps_to_its_means_and_takes_the_parts_that_are_ther
     assert drawn(learned, shop, folder) == other
 
 
+@pytest.mark.thorough
+@needs(extras.FAST)
+def test_a_table_that_names_its_meshes_has_one_means_and_the_same_bytes_with_and_without_a_cache(
+    learned, shop, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(kernels, "MANY_ON_MESH", 6)
+    rows = (shop / "p.csv").read_text().split()
+    for i, row in enumerate(rows[1:]):
+        (tmp_path / f"{i}.off").write_text((shop / "saddle.off").read_text() + "\n" * i)
+        rows[i + 1] = f"{row},{i}.off"
+    (tmp_path / "p.csv").write_text("\n".join([rows[0] + ",surface", *rows[1:]]))
+    words = ["--pairs", tmp_path / "p.csv", "--surfaces-per-part", 2]
+    cache = ["--surface-cache", tmp_path / "cache"]
+
+    def bytes_of(name, *more):
+        done = run(learned, "-o", tmp_path / name, *words, *more)
+        assert done.exit_code == 0, done.stderr
+        return {path.name: path.read_bytes() for path in (tmp_path / name).glob("*.parquet")}
+
+    auto = bytes_of("auto")
+    assert auto == bytes_of("named", "--kernels", "compiled")
+    assert auto == bytes_of("first", *cache, "--jobs", 2) == bytes_of("kept", *cache)
+    bytes_of("pure", "--kernels", "pure")
+    for name in ("part-00000.parquet", "part-00002.parquet"):
+        pure, fast = (read(tmp_path / folder / name) for folder in ("pure", "auto"))
+        for column, values in pure.columns.items():
+            if values.dtype == float:
+                np.testing.assert_allclose(fast.columns[column], values, rtol=0, atol=1e-11)
+
+
 @pytest.mark.slow
 def test_small_tables_and_single_strokes_are_drawn_without_kernels(
     learned, shop, tmp_path, monkeypatch

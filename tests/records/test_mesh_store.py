@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from dmpcli import extras
 from dmpcli.records import file_io, mesh_store
 from dmpcli.records.mesh_store import MeshStore
 from dmpcli.spatial.pose import Pose
+from tests.extras_here import needs
 from tests.records.meshes import grid
 
 POSE = Pose.of(np.array([10.0, -20.0, 5.0, 0.1, 0.2, -0.7]))
@@ -55,6 +57,27 @@ def test_what_was_kept_is_what_would_be_found(tmp_path, pose, noise, unit):
     same(plain, store.load(part, unit, pose))
     assert len(list((tmp_path / "kept").iterdir())) == 1
     same(plain, MeshStore(str(tmp_path / "kept")).load(part, unit, pose))
+
+
+@pytest.mark.thorough
+@needs(extras.FAST)
+def test_for_kernels_the_order_of_the_search_tree_is_kept_too_and_added_where_it_is_not(tmp_path):
+    part = source(tmp_path / "part.stl")
+    plain = MeshStore().load(part)
+    MeshStore(str(tmp_path / "kept")).load(part)
+    store = MeshStore(str(tmp_path / "kept"), kernels=True)
+    assert not MeshStore(str(tmp_path / "kept")).load(part)[1].knows_order
+    for _ in range(2):
+        again = store.load(part)
+        same(plain, again)
+        assert again[1].knows_order
+        for one, other in zip(plain[1].tree_order, again[1].tree_order, strict=True):
+            same_bits(one, other)
+    read = MeshStore(str(tmp_path / "kept")).load(part)
+    assert read[1].knows_order
+    facets, anew = read[1].with_kernels.facets, plain[1].with_kernels.facets
+    for one, other in zip(facets[:2], anew[:2], strict=True):
+        same_bits(one, other)
 
 
 def test_another_pose_unit_or_content_is_another_entry(tmp_path):

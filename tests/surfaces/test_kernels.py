@@ -1,5 +1,8 @@
 """Kernels beside numpy: the same strokes but for rounding, and the same refusals."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -171,27 +174,67 @@ def test_a_kernels_arctangent_is_exact_to_rounding():
 
 
 def test_vertices_that_lie_on_one_another_are_marked_and_of_a_smooth_mesh_none():
-    from dmpcli.surfaces.kernels.mesh import Geometry, _split
+    from dmpcli.surfaces.kernels.tree import FLAGS, SPLIT
 
     for mesh in (plate_with_fin(2, 6)[0], cases.mesh("saddle", 200)):
-        topology = mesh.topology
-        geometry = Geometry(
-            mesh.F,
-            mesh.corners,
-            mesh.face_normals,
-            mesh.shape.corner_normals,
-            mesh.shape.reach,
-            mesh.components,
-            topology.neighbours,
-            topology.border,
-            topology.border_vertices,
-        )
         apart = np.linalg.norm(mesh.V[:, None] - mesh.V, axis=2) + 9.0 * np.eye(len(mesh.V))
         twice = apart.min(axis=1) < 1e-9
         assert twice.any() == (len(mesh.slits) > 0)
-        marked = _split(geometry)
-        assert marked[twice].all()
-        assert marked.sum() <= 2 * twice.sum()
+        known = mesh.with_kernels
+        split = known.facets.numbers[known.for_kernels.rows, FLAGS] & SPLIT > 0
+        np.testing.assert_array_equal(split, twice[mesh.F].any(axis=1))
+
+
+def region(far):
+    """A sheet of 20,000 facets, one box on it, and strokes about one place or over all of it."""
+    mesh = Mesh(*fields.square(cases.FIELDS["bumpy"], 20_000, reach=150.0))
+    rng = np.random.default_rng(7)
+    start = np.pad(rng.uniform(-40.0, 0.0, (6, 2)), ((0, 0), (0, 1)))
+    goal = start + [[60.0, 10.0, 0.0]]
+    goal[-1] += far
+    return mesh, start, goal
+
+
+@pytest.mark.parametrize("far", [0.0, [70.0, 60.0, 0.0]], ids=["as expected", "far beyond"])
+def test_what_kernels_find_does_not_hang_on_how_much_of_the_shape_they_know(far):
+    """Bit by bit; where a stroke leaves what was expected, the shape there is found too."""
+    mesh, start, goal = region(np.zeros(3))
+    mesh.expect(start, goal, 20.0)
+    some = mesh.with_kernels
+    _, start, goal = region(far)
+    charts = some.charts(start, goal)
+    found = charts.lift(waves(charts.lengths))
+    left = some.for_kernels.unknown
+    assert 0 < left < len(mesh.F)
+    whole = Mesh(mesh.V, mesh.F).with_kernels
+    assert whole.facets is whole.for_kernels.facets
+    assert whole.for_kernels.unknown == 0
+    others = whole.charts(start, goal)
+    expected = others.lift(waves(others.lengths))
+    assert not expected.status.any()
+    for name in ("position", "axes", "status", "outside"):
+        assert getattr(found, name).tobytes() == getattr(expected, name).tobytes(), name
+    # Asked for all, it knows all, the same.
+    from dmpcli.surfaces.kernels.tree import CLEARANCE
+
+    np.testing.assert_array_equal(
+        some.facets.reals[:, :CLEARANCE], whole.facets.reals[:, :CLEARANCE]
+    )
+    np.testing.assert_array_equal(some.facets.numbers, whole.facets.numbers)
+    assert some.for_kernels.unknown == 0
+
+
+def test_a_mesh_with_kernels_is_let_go_of_when_nobody_holds_it():
+    mesh = region(np.zeros(3))[0]
+    assert mesh.with_kernels.with_kernels is mesh.with_kernels
+    gone = weakref.ref(mesh.with_kernels)
+    assert len(mesh.with_kernels.facets.reals) == len(mesh.F)
+    gc.disable()
+    try:
+        del mesh
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def test_boxes_in_single_precision_hold_those_in_double():

@@ -1,10 +1,15 @@
 """Nodes of strips: differences of fourth order, and which nodes cells need."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dmpcli.surfaces import compiled_stepping, strip_grid
-from dmpcli.surfaces.strip_grid import Grid
+from dmpcli.surfaces.mesh import Mesh
+from dmpcli.surfaces.strip_grid import CentreLines, Grid
+from dmpcli.surfaces.surface import Status
+from tests.surfaces import cases, fields
 from tests.surfaces.test_mesh import folded
 
 
@@ -59,3 +64,34 @@ def test_a_mesh_without_kernels_is_walked_without_them(monkeypatch):
     begin, end = np.array([[[-20.0, 1.0, 0.0]], [[20.0, 1.0, 0.0]]])
     lift = mesh.charts(begin, end).lift(np.array([[[0.0, 0, 0], [10.0, 5.0, 0], [40.0, 0, 0]]]))
     np.testing.assert_allclose(lift.position[0, 1], [-10.0, 6.0, 0.0], atol=1e-9)
+
+
+def test_what_was_walked_to_find_the_goal_is_the_centre_line_bit_by_bit():
+    """Beside the border too, and on strokes that swing beyond their goals and starts."""
+    mesh = Mesh(*fields.square(cases.FIELDS["bumpy"], 5_000, reach=100.0))
+    rng = np.random.default_rng(3)
+    ends = np.pad(rng.uniform(-98.0, 98.0, (60, 2, 2)), ((0, 0), (0, 0), (0, 1)))
+    charts = mesh.charts(ends[:, 0], ends[:, 1])
+    rows = np.flatnonzero((charts.status == Status.DRAWN) & ~charts.creased)
+    assert len(rows) > 40
+    centre = charts.centre.rows(rows)
+    assert centre.course is not None
+    assert centre.course.begin_as(centre.direction, centre.step)
+    anew = replace(centre, course=None)
+    for behind, ahead in ((0, 3), (2, 0), (3, 40)):
+        counts = np.full(len(rows), behind), np.full(len(rows), ahead)
+        found, expected = (
+            vars(CentreLines.walked(mesh, one, *counts)._lines) for one in (centre, anew)
+        )
+        for name, values in expected.items():
+            assert values.tobytes() == found[name].tobytes(), name
+    assert expected["away"].any()
+
+
+def test_a_course_of_another_heading_is_not_taken_for_the_centre_line():
+    mesh = folded(0.0)
+    charts = mesh.charts(np.array([[-20.0, 1.0, 0.0]]), np.array([[20.0, 1.0, 0.0]]))
+    turned = replace(charts.centre, direction=np.array([[0.0, 1.0, 0.0]]))
+    found = CentreLines.walked(mesh, turned, np.array([0]), np.array([4]))
+    step = float(charts.centre.step[0, 0])
+    np.testing.assert_allclose(found.position[0, -1], [-20.0, 1.0 + 4 * step, 0.0], atol=1e-9)

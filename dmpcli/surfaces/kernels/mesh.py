@@ -4,73 +4,106 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Integers, Singles
+from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
 from dmpcli.surfaces.kernels import tree
-from dmpcli.surfaces.kernels.tree import Facets
+from dmpcli.surfaces.kernels.tree import Facets, TreeOrder
 
 
 @dataclass(frozen=True)
 class Geometry:
     """What kernels need to know of a mesh of m faces; see `TriangleMesh`."""
 
+    vertices: Floats
     faces: Integers
     corners: Floats
     face_normals: Floats
-    corner_normals: Floats
-    reach: Floats
     components: Integers
     neighbours: Integers
-    border: Booleans
     border_vertices: Booleans
 
 
-@dataclass(frozen=True)
 class Compiled:
-    """Facets, and where those of the mesh lie in their order, shape (m,)."""
+    """Facets, and where those of the mesh lie in their order.
 
-    facets: Facets
-    rows: Integers
+    Their shape, which is dear, is learned where it is wanted: what kernels find does not hang on
+    how much of it is known.
+
+    Parameters
+    ----------
+    mesh : Geometry
+    ordered : TreeOrder
+
+    Attributes
+    ----------
+    facets : Facets
+    rows : array of int, shape (m,)
+    unknown : int
+        Facets whose shape was not told.
+    """
+
+    def __init__(self, mesh: Geometry, ordered: TreeOrder) -> None:
+        order, first = ordered
+        m = self.unknown = len(order)
+        self.rows = np.empty(m, dtype=np.int64)
+        self.rows[order] = np.arange(m)
+        reals, numbers = np.empty((m, tree.REALS)), np.zeros((m, tree.NUMBERS), dtype=np.int32)
+        faces = tree.FaceArrays(
+            mesh.corners,
+            mesh.face_normals,
+            mesh.neighbours,
+            mesh.faces,
+            mesh.components,
+            mesh.border_vertices,
+        )
+        tree.fill(reals, numbers, faces, order, self.rows.astype(np.int32))
+        self._lying = _on_one_another(mesh.vertices)
+        self.facets = Facets(_outwards(tree.boxes_of(reals, first)), first, reals, numbers)
+
+    def asked(self) -> Integers:
+        """Faces whose shape kernels have asked for and not found."""
+        rows = np.flatnonzero(self.facets.reals[:, tree.REACH] == tree.ASKED)
+        faces: Integers = self.facets.numbers[rows, tree.FACE].astype(np.int64)
+        return faces
+
+    def learn(self, faces: Integers, normals: Floats, reach: Floats, inner: Booleans) -> None:
+        """Learn the shape of some faces.
+
+        Parameters
+        ----------
+        faces : array of int, shape (k,)
+        normals : array, shape (k, 3, 3)
+            Smooth, at their corners.
+        reach : array, shape (k,)
+            mm, see `MeshShape.reach`.
+        inner : array of bool, shape (k,)
+            Those about whose vertices there are no others; only these are learned.
+        """
+        rows = self.rows[faces]
+        at = self.facets.numbers[rows, tree.VERTICES : tree.VERTICES + 3]
+        apart = _split(at, normals, len(self._lying))
+        split = (apart[at] | self._lying[at]).any(axis=1)
+        new = np.flatnonzero(inner & (self.facets.reals[rows, tree.REACH] < 0.0))
+        tree.shape(self.facets, rows[new], normals[new], reach[new], split[new])
+        self.unknown -= len(new)
 
 
-def compiled(mesh: Geometry) -> Compiled:
-    """Make facets ready: a record of each, in the order of a search tree."""
-    order, first = tree.ordered(mesh.corners, tree.depth_of(len(mesh.faces)))
-    m = len(order)
-    reals = np.zeros((m, tree.REALS))
-    reals[:, : tree.NORMAL] = mesh.corners[order].reshape(m, 9)
-    reals[:, tree.NORMAL : tree.MAP] = mesh.face_normals[order]
-    reals[:, tree.REACH], reals[:, tree.CLEARANCE] = mesh.reach[order], -1.0
-    tree.fill(reals, mesh.corner_normals[order])
-    rows = np.empty(m, dtype=np.int64)
-    rows[order] = np.arange(m)
-    numbers = np.zeros((m, tree.NUMBERS), dtype=np.int32)
-    across = mesh.neighbours[order]
-    numbers[:, :3] = np.where(across >= 0, rows[across], across)
-    bits = np.array([1, 2, 4])
-    ends = mesh.border_vertices[mesh.faces[order]]
-    numbers[:, tree.FLAGS] = mesh.border[order] @ bits + 8 * (ends @ bits)
-    numbers[:, tree.FLAGS] += 64 * _split(mesh)[mesh.faces[order]].any(axis=1)
-    numbers[:, tree.PART], numbers[:, tree.FACE] = mesh.components[order], order
-    numbers[:, tree.VERTICES : tree.VERTICES + 3] = mesh.faces[order]
-    return Compiled(Facets(_outwards(tree.boxes_of(reals, first)), first, reals, numbers), rows)
-
-
-def _split(mesh: Geometry) -> Booleans:
-    """Vertices (n,) about which facets have normals of their own, or that lie on one another."""
-    at, count = mesh.faces.reshape(-1), len(mesh.border_vertices)
-    normals = mesh.corner_normals.reshape(-1, 3)
-    one = np.zeros((count, 3))
+def _split(at: Halves, normals: Floats, count: int) -> Booleans:
+    """Vertices, of so many, about which facets (k, 3) have normals of their own."""
+    one, split = np.zeros((count, 3)), np.zeros(count, dtype=bool)
     one[at] = normals
-    split = np.zeros(count, dtype=bool)
-    split[at[(np.abs(normals - one[at]) > 1e-12).any(axis=1)]] = True
-    points = np.zeros((count, 3))
-    points[at] = mesh.corners.reshape(-1, 3)
+    split[at[(np.abs(normals - one[at]) > 1e-12).any(axis=-1)]] = True
+    return split
+
+
+def _on_one_another(points: Floats) -> Booleans:
+    """Points (n, 3) that lie on others."""
+    lying = np.zeros(len(points), dtype=bool)
     # What lies at one point has one number; others may have it too, which does no harm.
     number = points @ np.array([0.6180339887, 1.4142135624, 1.7320508076])
-    order = np.argsort(number, kind="stable")
-    same = np.diff(number[order]) <= 1e-9 * max(1.0, float(np.abs(number).max()))
-    split[order[1:][same]] = split[order[:-1][same]] = True
-    return split
+    order = np.argsort(number)
+    same = np.diff(number[order]) <= 1e-9 * max(1.0, float(np.abs(number).max(initial=0.0)))
+    lying[order[1:][same]] = lying[order[:-1][same]] = True
+    return lying
 
 
 def _outwards(boxes: Floats) -> Singles:

@@ -5,12 +5,13 @@ import numpy as np
 from dmpcli.spatial import rotations
 from dmpcli.spatial.kernels import euler_of_products
 from dmpcli.surfaces.kernels import checks, facet_walks, samples, smoothing, stepping, tree
-from dmpcli.surfaces.kernels.mesh import Geometry, compiled
+from dmpcli.surfaces.kernels.mesh import Compiled, Geometry
 
 _ENTRIES = (
     tree.ordered,
     tree.boxes_of,
     tree.fill,
+    tree.shape,
     tree.search,
     stepping.start,
     stepping.ends,
@@ -40,19 +41,14 @@ def load() -> None:
     faces = np.array([[0, 1, 2], [1, 3, 2]])
     n = np.tile([0.0, 0.0, 1.0], (2, 1))
     none = np.zeros((2, 3), dtype=bool)
-    facets = compiled(
-        Geometry(
-            faces,
-            corners,
-            n,
-            np.repeat(n[:, None], 3, axis=1),
-            np.ones(2),
-            np.zeros(2, dtype=np.int64),
-            np.array([[-1, 1, -1], [-1, -1, 0]]),
-            none,
-            np.zeros(4, dtype=bool),
-        )
-    ).facets
+    neighbours = np.array([[-1, 1, -1], [-1, -1, 0]])
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    parts, border = np.zeros(2, dtype=np.int64), np.zeros(4, dtype=bool)
+    mesh = Geometry(points, faces, corners, n, parts, neighbours, border)
+    known = Compiled(mesh, tree.TreeOrder.of(corners))
+    normals = np.repeat(n[:, None], 3, axis=1)
+    known.learn(np.arange(2), normals, np.ones(2), np.ones(2, dtype=bool))
+    facets = known.facets
     v, one, number, mark = np.empty((0, 3)), np.empty((0, 1)), np.empty(0, np.int64), none[:0, 0]
     tree.search(facets, v)
     walks = stepping.Walks(v, v, v, v, one, one, number, v, one[:, 0])

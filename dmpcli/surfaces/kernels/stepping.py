@@ -89,7 +89,8 @@ def _probe(
     good = dot(there, normal) > limits.sharp and facets.numbers[row, PART] == part
     good = good and not beyond_border(facets, p, foot, row, limits.on_border)
     unsure = in_doubt(facets, p, foot, row)
-    if unsure and not facets.numbers[row, FLAGS] & SPLIT:
+    known = facets.reals[row, REACH] >= 0.0
+    if unsure and known and not facets.numbers[row, FLAGS] & SPLIT:
         unsure = not nothing_else(facets, p, foot, nodes)
     return there, good, unsure
 

@@ -39,7 +39,8 @@ class Facets(NamedTuple):
     reals : array, shape (m, 40)
         From 0: three corners; `NORMAL`: unit normal; `MAP`: affine map, 3 x 3 and 3, from a
         position, counted from the first corner, to the smooth normal; `EDGES`: unit vectors in the
-        plane, square to the edges, outwards, and how far along them the edges lie; `REACH`, mm;
+        plane, square to the edges, outwards, and how far along them the edges lie; `REACH`, mm, and
+        less than 0 where neither it nor the map is known yet, `ASKED` where it was wanted;
         then, once known, what `samples.certified` asks: `CLEARANCE`, mm (-1 before), and `SLOPE`.
     numbers : array of int32, shape (m, 16)
         From 0: `Topology.neighbours`, in the tree's order; `FLAGS`: bits 0 to 2 are edges of the
@@ -55,6 +56,24 @@ class Facets(NamedTuple):
 
 NORMAL, MAP, EDGES, REACH, CLEARANCE, SLOPE, REALS = 9, 12, 24, 36, 37, 38, 40
 FLAGS, PART, FACE, VERTICES, NUMBERS = 3, 4, 5, 6, 16
+
+
+UNKNOWN, ASKED = -1.0, -2.0
+
+
+class FaceArrays(NamedTuple):
+    """What is known of all m faces of a mesh: see `Geometry`.
+
+    Corners (m, 3, 3), unit normals (m, 3), neighbours, vertices (m, 3), components (m,), and of the
+    vertices (n,) whether they lie on the border.
+    """
+
+    corners: Floats
+    normals: Floats
+    neighbours: Integers
+    vertices: Integers
+    part: Integers
+    border: Booleans
 
 
 @kernel
@@ -123,6 +142,18 @@ def depth_of(count: int) -> int:
     return depth
 
 
+class TreeOrder(NamedTuple):
+    """Which facets lie where: `order` (m,), and where the leaves begin, `first` (leaves + 1,)."""
+
+    order: Halves
+    first: Halves
+
+    @classmethod
+    def of(cls, corners: Floats) -> "TreeOrder":
+        """Sort facets (m, 3, 3) into a tree."""
+        return cls(*ordered(corners, depth_of(len(corners))))
+
+
 @kernel
 def boxes_of(reals: Floats, first: Halves) -> Floats:
     """Boxes of all nodes."""
@@ -143,18 +174,38 @@ def boxes_of(reals: Floats, first: Halves) -> Floats:
 
 
 @kernel
-def fill(reals: Floats, normals: Floats) -> None:
-    """Fill in map and edges of facets whose corners have normals (m, 3, 3)."""
-    for i in range(len(reals)):
-        n = flat_normal(reals, i)
-        a, b, c = corner(reals, i, 0), corner(reals, i, 1), corner(reals, i, 2)
-        opposite = (sub(c, b), sub(a, c), sub(b, a))
+def fill(reals: Floats, numbers: Halves, faces: FaceArrays, order: Halves, rows: Halves) -> None:
+    """Fill in what corners, neighbours and borders tell of all facets; shapes are `UNKNOWN`."""
+    for i in range(len(order)):
+        face = order[i]
+        for k in range(9):
+            reals[i, k] = faces.corners[face, k // 3, k % 3]
         for k in range(3):
-            way = opposite[2] if k == 0 else opposite[0] if k == 1 else opposite[1]
-            outward = cross(unit(way), n)
+            reals[i, NORMAL + k] = faces.normals[face, k]
+        reals[i, REACH], reals[i, CLEARANCE] = UNKNOWN, -1.0
+        n, flags = flat_normal(reals, i), 0
+        for k in range(3):
+            a = corner(reals, i, k)
+            outward = cross(unit(sub(corner(reals, i, (k + 1) % 3), a)), n)
             at = EDGES + 3 * k
             reals[i, at], reals[i, at + 1], reals[i, at + 2] = outward
-            reals[i, EDGES + 9 + k] = dot(outward, corner(reals, i, k))
+            reals[i, EDGES + 9 + k] = dot(outward, a)
+            across, vertex = faces.neighbours[face, k], faces.vertices[face, k]
+            numbers[i, k] = rows[across] if across >= 0 else across
+            numbers[i, VERTICES + k] = vertex
+            flags |= (1 << k) if across == -1 else 0
+            flags |= (8 << k) if faces.border[vertex] else 0
+        numbers[i, FLAGS], numbers[i, PART], numbers[i, FACE] = flags, faces.part[face], face
+
+
+@kernel
+def shape(facets: Facets, rows: Integers, normals: Floats, reach: Floats, split: Booleans) -> None:
+    """Fill in maps, reach and `SPLIT` of some facets, whose corners have normals (k, 3, 3)."""
+    reals = facets.reals
+    for j in range(len(rows)):
+        i = rows[j]
+        a, b, c = corner(reals, i, 0), corner(reals, i, 1), corner(reals, i, 2)
+        opposite = (sub(c, b), sub(a, c), sub(b, a))
         # Gradients of the barycentric coordinates: exact on slivers too.
         area = cross(opposite[0], opposite[1])
         size = dot(area, area)
@@ -162,11 +213,14 @@ def fill(reals: Floats, normals: Floats) -> None:
         g1 = times(1.0 / size, cross(area, opposite[1]))
         g2 = times(1.0 / size, cross(area, opposite[2]))
         for k in range(3):
-            slope = add(times(normals[i, 0, k], g0), times(normals[i, 1, k], g1))
-            slope = add(slope, times(normals[i, 2, k], g2))
+            slope = add(times(normals[j, 0, k], g0), times(normals[j, 1, k], g1))
+            slope = add(slope, times(normals[j, 2, k], g2))
             at = MAP + 3 * k
             reals[i, at], reals[i, at + 1], reals[i, at + 2] = slope
-            reals[i, MAP + 9 + k] = normals[i, 0, k]
+            reals[i, MAP + 9 + k] = normals[j, 0, k]
+        reals[i, REACH] = reach[j]
+        if split[j]:
+            facets.numbers[i, FLAGS] |= SPLIT
 
 
 @kernel
@@ -354,12 +408,16 @@ def in_doubt(facets: Facets, p: Vector, foot: Vector, row: int) -> bool:
 
     At creases, where sheets touch, and far off the mesh the answer hangs on which of several facets
     at the same distance a search comes upon. Then numpy's way decides, so that both ways agree.
+    A facet whose shape is not known is asked for: see `TriangleMesh.made_known`.
 
     Parameters
     ----------
     p, foot : tuple of float
         A point and its closest one, which lies on the facet of this row, mm.
     """
+    if facets.reals[row, REACH] < 0.0:
+        facets.reals[row, REACH] = ASKED
+        return True
     gap = sub(p, foot)
     if not facets.numbers[row, FLAGS] & SPLIT and dot(gap, gap) < _REACH:
         return False
