@@ -40,67 +40,6 @@ def ways(dt: Floats, position: Floats, length: Floats, speed: Floats) -> None:
 
 
 @kernel
-def smoothness(
-    dt: float, waves: Floats, ends: Floats, speed: Floats, jerk: Floats, rough: Floats
-) -> None:
-    """Fill in what smoothness is told by, of evenly sampled strokes (3, B, n), n ≥ 5.
-
-    Parameters
-    ----------
-    dt : float
-        s.
-    waves : array, shape (3, B, n - 2)
-        What lies between both ends, less the line from one to the other, mm.
-    ends : array, shape (2, 3, B)
-        First and last samples, mm.
-    speed : array, shape (B, n - 1)
-        mm/s.
-    jerk : array, shape (B,)
-        Sum of the squared third differences, of which the first and last count twice, mm².
-    rough : array, shape (B,)
-        Sums of the magnitudes of the speed's second differences, where zeros go before and follow,
-        mm/s.
-    """
-    n = waves.shape[2] + 2
-    padded, p = np.zeros(n + 3), np.empty((3, n))
-    for b in range(waves.shape[1]):
-        for k in range(3):
-            start, end = ends[0, k, b], ends[1, k, b]
-            p[k, 0], p[k, n - 1] = start, end
-            for i in range(1, n - 1):
-                p[k, i] = (start + (i / (n - 1)) * (end - start)) + waves[k, b, i - 1]
-        total, first, last = 0.0, 0.0, 0.0
-        for i in range(n - 3):
-            off = 0.0
-            for k in range(3):
-                third = p[k, i + 3] - 3.0 * (p[k, i + 2] - p[k, i + 1]) - p[k, i]
-                off += third * third
-            total += off
-            first = off if i == 0 else first
-            last = off
-        jerk[b] = total + first + last
-        for i in range(n - 1):
-            x, y, z = p[0, i + 1] - p[0, i], p[1, i + 1] - p[1, i], p[2, i + 1] - p[2, i]
-            padded[i + 2] = math.sqrt(x * x + y * y + z * z) / dt
-            speed[b, i] = padded[i + 2]
-        total = 0.0
-        for i in range(n + 1):
-            total += abs(padded[i + 2] - 2.0 * padded[i + 1] + padded[i])
-        rough[b] = total
-
-
-@kernel
-def less_line(p: Floats, waves: Floats) -> None:
-    """Fill in (3, B, n - 2) what lies between both ends, less the line from one to the other."""
-    n = p.shape[2]
-    for k in range(3):
-        for b in range(p.shape[1]):
-            start, end = p[k, b, 0], p[k, b, n - 1]
-            for i in range(1, n - 1):
-                waves[k, b, i - 1] = p[k, b, i] - (start + (i / (n - 1)) * (end - start))
-
-
-@kernel
 def _walked(v: Floats, b: int, least: float, stroke: Integers, sample: Integers, held: int) -> int:
     """Turning points of one signal, see `wave_height._turning_points`; how many there are then."""
     low, high, way = 0, 0, 0
