@@ -1,14 +1,22 @@
 """What `report` costs over a batch. ``python -m benchmarks.reports FOLDER [PLANE [MESH]]``.
 
-Batches of so many strokes (10,000 on a plane, 400 on 50,000 faces) are reported, and such of a
-fifth of them, by kernels and by numpy in turn. Three things are told apart, in processor time:
-measuring alone, in one process, the best of three turns (reading the parts, figures of the strokes,
-lines of the CSV files); the whole command with two processes, of which what a stroke adds is the
-difference between both sizes; and what is left of that without any stroke: starting, loading,
-reading the demonstration and the mesh, drawing the figures and the page. With it the largest memory
-of all processes (proportional set sizes). Nothing is extrapolated. Some minutes.
+Batches of so many strokes (10,000 on a plane, 2,000 on 50,000 faces) are reported, and such of a
+fifth of them. Two things are told apart:
+
+- measuring alone, of the smaller batch in one process: reading the parts, figures of the strokes,
+  lines of the CSV files. Processor time a stroke by kernels, least of three turns, and by numpy.
+- the whole command with two processes, by kernels. What a stroke adds is the difference between
+  both sizes, in processor time of all processes and by the clock; what is left of that without any
+  stroke is starting, loading, reading the demonstration and the mesh, drawing figures and page.
+  With it the largest memory of all processes (proportional set sizes).
+
+``--first CHECKOUT`` is a working tree of an earlier commit, whose `report` is run in turn with this
+one on the smaller batch and a fifth of it, and the ratio of what a stroke adds is told. What the
+clock says is to be believed only where nothing else runs. Some minutes; for what a large batch
+takes give 100000 20000.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -38,7 +46,13 @@ from tests.surfaces import cases, fields
 
 REFERENCE = Path("sample_runs/reference.parquet")
 TURNS, FEWER = 3, 5
-MEANS = ("pure", "compiled")
+Kinds = dict[str, tuple[str, int, Path | None]]
+"""What batches are called, how many strokes the larger ones have, and the surface that is named."""
+
+
+def sizes(count: int) -> tuple[int, ...]:
+    """Return how many strokes the batches have, the least first."""
+    return count // FEWER**2, count // FEWER, count
 
 
 def batches(place: Path, plane: int, mesh: int) -> None:
@@ -49,16 +63,17 @@ def batches(place: Path, plane: int, mesh: int) -> None:
         V, F = fields.square(cases.FIELDS["bumpy"], FACES[1], reach=200.0)
         trimesh.Trimesh(V, F, process=False).export(place / "bumpy.ply")
     on_mesh = ("--surface", place / "bumpy.ply", "--snap-tol", 1, "--on-error", "skip")
-    for count in (plane // FEWER, plane):
+    for count in sizes(plane):
         folder = place / f"plane-{count}"
         if not folder.exists():
             table = table_of(place, level_pairs(count), f"level-{count}")
             subprocess.run(command(place, table, folder, "--jobs", 2), check=True)
-    for count in (mesh // FEWER, mesh):
+    for count in sizes(mesh):
         folder = place / f"mesh-{count}"
         if not folder.exists():
             table = table_of(place, curved_pairs(count), f"curved-{count}")
-            part = ("--pairs-per-part", max(1, count // 2), "--kernels", "compiled")
+            size = min(2000, max(1, count // 2))
+            part = ("--pairs-per-part", size, "--kernels", "compiled")
             subprocess.run(command(place, table, folder, "--jobs", 2, *part, *on_mesh), check=True)
 
 
@@ -90,46 +105,60 @@ def alone(sight: MeasurementContext, folder: Path) -> Callable[[], float]:
     return run
 
 
-def measuring(kinds: dict[str, tuple[str, int, Path | None]], place: Path) -> None:
+def measuring(kinds: Kinds, place: Path) -> None:
     """Print what measuring alone takes."""
     memory.keep()
-    print("| measuring alone, one process | numpy, ms | kernels, ms | strokes a second |")
+    print("| measuring alone, one process | numpy, CPU ms a stroke | kernels | strokes per CPU s |")
     print("| --- | ---: | ---: | ---: |")
     for name, (kind, count, surface) in kinds.items():
-        sight = context(surface)
-        runs = {
-            means: alone(replace(sight, compiled=means == "compiled"), place / f"{kind}-{count}")
-            for means in MEANS
-        }
-        took: dict[str, list[float]] = {means: [] for means in MEANS}
-        for _ in range(TURNS):
-            for means in MEANS:
-                took[means].append(runs[means]())
-        pure, compiled = (min(took[means]) for means in MEANS)
-        print(
-            f"| {count} {name} | {pure:.3f} | {compiled:.3f} | {1e3 / compiled:.0f} |", flush=True
-        )
+        few = sizes(count)[1]
+        sight, folder = context(surface), place / f"{kind}-{few}"
+        by_kernels = alone(replace(sight, compiled=True), folder)
+        compiled = min(by_kernels() for _ in range(TURNS))
+        pure = alone(sight, folder)()
+        row = f"{few} {name} | {pure:.3f} | {compiled:.3f} | {1e3 / compiled:.0f}"
+        print(f"| {row} |", flush=True)
 
 
-def commands(kinds: dict[str, tuple[str, int, Path | None]], place: Path) -> None:
-    """Print what the whole command takes, with two processes."""
-    print("| whole command, `--jobs 2` | by | ms a stroke | without a stroke, s | MiB at most |")
-    print("| --- | --- | ---: | ---: | ---: |")
+def reported(
+    program: list[str], more: list[str], batch: Path, surface: Path | None, place: Path
+) -> tuple[float, ...]:
+    """Report a batch by a program; wall s, processor s, largest memory in MiB."""
+    said = ["report", REFERENCE, batch, "-o", place / "report", "-q", *more]
+    said += [] if surface is None else ["--surface", surface]
+    quietly = ["sh", "-c", 'exec "$@" > /dev/null', "sh"]
+    return measured([*quietly, *program, *(str(word) for word in said)])
+
+
+def commands(kinds: Kinds, place: Path, first: Path | None) -> None:
+    """Print what the whole command takes, with two processes, and an earlier one in turn."""
+    ours, by = [str(BIN / "dmpcli")], ["--jobs", "2", "--kernels", "compiled"]
+    heads = [
+        *("whole command, `--jobs 2`, by kernels", "CPU ms a stroke", "strokes/s by the clock"),
+        *("without a stroke, CPU s", "MiB at most", "earlier, CPU ms a stroke", "ratio"),
+    ]
+    print(f"| {' | '.join(heads)} |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     for name, (kind, count, surface) in kinds.items():
-        for means in MEANS:
-            spent, largest = [], 0.0
-            for size in (count // FEWER, count):
-                words = [BIN / "dmpcli", "report", REFERENCE, place / f"{kind}-{size}"]
-                words += ["-o", place / "report", "--jobs", 2, "-q", "--kernels", means]
-                words += [] if surface is None else ["--surface", surface]
-                quietly = ["sh", "-c", 'exec "$@" > /dev/null', "sh"]
-                _, processor, most = measured([*quietly, *(str(word) for word in words)])
-                spent.append(processor)
-                largest = max(largest, most)
-            each = (spent[1] - spent[0]) / (count - count // FEWER)
-            rest = spent[1] - each * count
-            row = f"{count} {name} | {means} | {1e3 * each:.3f} | {rest:.1f} | {largest:.0f}"
-            print(f"| {row} |", flush=True)
+        least, few, _ = sizes(count)
+        spent = {
+            size: reported(ours, by, place / f"{kind}-{size}", surface, place)
+            for size in (few, count)
+        }
+        wall, processor = ((spent[count][i] - spent[few][i]) / (count - few) for i in range(2))
+        rest = spent[count][1] - processor * count
+        most = max(found[2] for found in spent.values())
+        row = f"{count} {name} | {1e3 * processor:.3f} | {1.0 / max(wall, 1e-9):.0f} | {rest:.1f}"
+        earlier = "- | -"
+        if first is not None:
+            there = ["env", f"PYTHONPATH={first}", sys.executable, "-m", "dmpcli"]
+            took = [
+                reported(there, [], place / f"{kind}-{size}", surface, place)[1]
+                for size in (least, few)
+            ]
+            each = (took[1] - took[0]) / (few - least)
+            earlier = f"{1e3 * each:.3f} | {each / processor:.1f}"
+        print(f"| {row} | {most:.0f} | {earlier} |", flush=True)
 
 
 def main() -> None:
@@ -138,19 +167,23 @@ def main() -> None:
         # As the command line has it; the library reads it once, as it is loaded.
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
         os.execv(sys.executable, [sys.executable, "-m", "benchmarks.reports", *sys.argv[1:]])
-    place = Path(sys.argv[1])
-    asked = [int(word) for word in sys.argv[2:4]]
-    plane, mesh = asked + [10_000, 400][len(asked) :]
+    asked = argparse.ArgumentParser()
+    asked.add_argument("folder", type=Path)
+    asked.add_argument("plane", type=int, nargs="?", default=10_000)
+    asked.add_argument("mesh", type=int, nargs="?", default=2_000)
+    asked.add_argument("--first", type=Path, help="working tree of an earlier commit")
+    said = asked.parse_args()
+    place: Path = said.folder
     place.mkdir(parents=True, exist_ok=True)
-    batches(place, plane, mesh)
-    kinds: dict[str, tuple[str, int, Path | None]] = {
-        "plane": ("plane", plane, None),
-        "plane, `--surface plane.json`": ("plane", plane, place / "plane.json"),
-        "50,000 faces, `--surface`": ("mesh", mesh, place / "bumpy.ply"),
+    batches(place, said.plane, said.mesh)
+    kinds: Kinds = {
+        "plane": ("plane", said.plane, None),
+        "plane, `--surface plane.json`": ("plane", said.plane, place / "plane.json"),
+        "50,000 faces, `--surface`": ("mesh", said.mesh, place / "bumpy.ply"),
     }
     measuring(kinds, place)
     print()
-    commands(kinds, place)
+    commands(kinds, place, said.first)
 
 
 if __name__ == "__main__":

@@ -108,10 +108,10 @@ class Taught:
 
     @cached_property
     def _curve(self) -> "tuple[Polyline, Floats]":
-        """What kernels search, and the clearance of its corners."""
+        """What kernels search, and the clearance of its corners beyond each reach."""
         from dmpcli.metrics.kernels import polyline
 
-        return polyline.curve(self.place), _clearance(self.place, _REACHES[:1])[0]
+        return polyline.curve(self.place), np.stack(_clearance(self.place, polyline.REACHES))
 
     def _walked(self, same: Floats, place: Floats, stretch: Floats) -> Deviations:
         """Deviations by kernels; `same` are the demonstration's places (3, n) at the phases."""

@@ -43,10 +43,11 @@ class TaughtHeights:
 
     @cached_property
     def _curve(self) -> "tuple[Polyline, Floats]":
-        """What kernels search, and the clearance of its corners beyond the next ones."""
+        """What kernels search, and the clearance of its corners beyond each reach."""
         from dmpcli.metrics.kernels import polyline
 
-        return polyline.curve(self.place), self._clearance(1)
+        clear = np.stack([self._clearance(reach) for reach in polyline.REACHES])
+        return polyline.curve(self.place), clear
 
     def _clearance(self, reach: int) -> Floats:
         """Least distance of each sample to those beyond a reach, shape (m,), mm."""

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.sine_series import lowered, zero_phase
+from dmpcli.sine_series import zero_phase
 
 CUTOFF = 10.0
 """Hz: above it a hand's movement holds noise only [3]; the same for files of every rate."""
@@ -79,18 +79,20 @@ def motions(
 
 
 def _by_kernels(t: Floats, position: Floats, start: Floats, goal: Floats) -> Motions:
-    from dmpcli.metrics.kernels import strokes
+    from dmpcli.metrics.kernels import smoothness, strokes
 
     count, n = position.shape[1:]
     length, peak, jerk, rough = np.empty((4, count))
     strokes.ways(np.diff(t), position, length, peak)
     dt, even = _resampled(t, position)
-    waves, speed = np.empty((3, count, n - 2)), np.empty((count, n - 1))
-    strokes.less_line(np.ascontiguousarray(even), waves)
-    ends = even[..., [0, -1]].transpose(2, 0, 1).copy()
+    sections, beyond, speed = np.empty((0, 3)), 0, np.empty((count, n - 1))
     if _low_passed(dt, CUTOFF):
-        waves = lowered(waves, CUTOFF * dt, ORDER)
-    strokes.smoothness(dt, waves, ends, speed, jerk, rough)
+        sections = smoothness.low_pass(CUTOFF * dt)
+        beyond = smoothness.settling(sections)
+        if beyond >= n:
+            # Too few samples for the recursion to settle on.
+            even, sections, beyond = zero_phase(even, CUTOFF * dt, ORDER), sections[:0], 0
+    smoothness.smoothness(dt, np.ascontiguousarray(even), sections, beyond, speed, jerk, rough)
     first, last = position[..., 0].T, position[..., -1].T
     return Motions(
         length,
@@ -212,11 +214,11 @@ def _sparc_of(
         count = min(int(needed[rows].max()) + 1, lines)
         wide, some = -(-count // 32) * 32, speed[rows]
         if folded:
-            spectrum = _folded(some, size, wide)[:, :count]
+            result[rows] = _folded_arc(some, size, wide, count, largest[rows])
         else:
             cosine, sine = _waves(n, size, wide)
             spectrum = np.sqrt((some @ cosine) ** 2 + (some @ sine) ** 2)[:, :count]
-        result[rows] = _arc(spectrum / largest[rows, None])
+            result[rows] = _arc(spectrum / largest[rows, None])
     rows = np.flatnonzero((largest > 0.0) & ~few)
     if len(rows):
         spectrum = np.abs(np.fft.rfft(speed[rows], size))[:, :lines]
@@ -224,25 +226,27 @@ def _sparc_of(
     return result
 
 
-def _folded(speed: Floats, size: int, count: int) -> Floats:
-    """First lines of the spectra of speeds (B, n), counted from their middles, (B, count).
+def _folded_arc(speed: Floats, size: int, wide: int, count: int, largest: Floats) -> Floats:
+    """Arcs (B,), by kernels, of the first `count` of `wide` lines of the spectra of speeds (B, n).
 
-    There cosines go with what a speed has in common with its mirror image, sines with the rest.
+    They are counted from their middles: there cosines go with what a speed has in common with its
+    mirror image, sines with the rest.
     """
+    from dmpcli.metrics.kernels import smoothness
+
     n = speed.shape[1]
     half = n - n // 2
     mirrored = speed[:, : n - half - 1 : -1]
     even, odd = speed[:, :half] + mirrored, speed[:, :half] - mirrored
     if n % 2:
         even[:, -1] *= 0.5  # the middle is its own image
-    nodes, lines = _half_waves(n, size, count)
+    nodes, lines = _half_waves(n, size, wide)
     real, imaginary = (
         (part @ at) @ to for part, at, to in zip((even, odd), nodes, lines, strict=True)
     )
-    real *= real
-    imaginary *= imaginary
-    real += imaginary
-    return np.asarray(np.sqrt(real, out=real))
+    arcs = np.empty(len(speed))
+    smoothness.arcs(real, imaginary, largest, _THRESHOLD, count, arcs)
+    return arcs
 
 
 @lru_cache(maxsize=4)

@@ -18,7 +18,7 @@ from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import DRAWN_ON, NORMAL, OK, Column, Schema
 from dmpcli.records.storage import Location, each
-from dmpcli.records.trajectory_reader import unit_normals
+from dmpcli.records.trajectory_reader import are_unit, unit_normals
 
 AGAIN = "the command that draws it goes on from the parts that are there"
 
@@ -452,6 +452,8 @@ def _check_normals(piece: Piece, batch: BatchFolder, offset: int) -> None:
         named = batch.normal[piece.rows]
     if piece.facts.get("normal") is not None:
         named = np.where(np.isfinite(named), named, piece.facts["normal"])
+    if not np.isfinite(named).any() and are_unit(*(piece.columns[n] for n in schemas.NORMAL)):
+        return
     unit_normals(
         f"{piece.name}: ",
         np.column_stack([piece.columns[n] for n in schemas.NORMAL]),

@@ -126,6 +126,15 @@ def _normals(record: Record, rows: Integers, facts: Mapping[str, Any]) -> Floats
     return unit_normals(_of(record), normals, one, rows)
 
 
+def are_unit(x: Floats, y: Floats, z: Floats) -> bool:
+    """Tell whether vectors by their components (n,) are surely unit vectors; takes little time."""
+    squared = x * x
+    squared += y * y
+    squared += z * z
+    # Lengths within a small tolerance of 1 have squares within twice as much, but for its square.
+    return bool(squared.min() >= 1.0 - 1.9 * UNIT and squared.max() <= 1.0 + 1.9 * UNIT)
+
+
 def unit_normals(
     name: str, normals: Floats | None, named: Floats | None, rows: Integers
 ) -> Floats | None:

@@ -20,7 +20,7 @@ from dmpcli.reporting.stroke import LEAST, ReportedStroke
 from dmpcli.reporting.stroke_block import MeasuredBlock, StrokeBlock, gathered
 from dmpcli.surfaces.strip_settling import Course
 
-_SAMPLES = 1 << 16
+_SAMPLES, _BY_KERNELS = 1 << 16, 1 << 17
 """Samples worked on at once: what is in work stays in the processor's cache."""
 
 _MOST_WORKERS = 4
@@ -116,7 +116,8 @@ def _blocks(
         for which, t in _alike(piece):
             if only is not None:
                 which = which[np.isin(piece.rows[which], only)]
-            course, size = _SharedCourse(), max(1, _SAMPLES // len(t))
+            course = _SharedCourse()
+            size = max(1, (_BY_KERNELS if sight.compiled else _SAMPLES) // len(t))
             size = min(size, AT_ONCE) if curved else size
             for number, those in _apart(batch, piece, which, sight):
                 for first in range(0, len(those), size):

@@ -275,7 +275,10 @@ def _coordinates(
         # What is not found on smooth strips is searched for, and rounding would tell how that ends:
         # so numpy does it, as for a single stroke.
         by_kernels = surface.with_kernels.charts(ends[rows, 0], ends[rows, 1], normal[rows])
-        found = on_strips(by_kernels, position[rows], course, (foot[rows], where[rows]))
+        some = position, foot, where
+        if len(rows) < count:
+            some = position[rows], foot[rows], where[rows]
+        found = on_strips(by_kernels, some[0], course, some[1:])
         whole = found.complete
         lengths[rows[whole]] = by_kernels.lengths[whole]
         uv[:, rows[whole]] = found.coordinates[whole, :, :2].transpose(2, 0, 1)

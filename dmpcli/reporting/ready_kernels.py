@@ -3,7 +3,7 @@
 import numpy as np
 
 from dmpcli.metrics.deviation import Taught
-from dmpcli.metrics.kernels import lying, polyline, strokes
+from dmpcli.metrics.kernels import lying, polyline, smoothness, strokes
 from dmpcli.metrics.many_on_surface import TaughtHeights
 from dmpcli.metrics.motion import motions
 from dmpcli.metrics.wave_height import many_waves
@@ -14,13 +14,13 @@ from dmpcli.surfaces.mesh import Mesh
 
 _STROKES = (
     *(polyline.deviations, polyline.heights_there),
-    *(strokes.charted, strokes.ways, strokes.less_line, strokes.smoothness),
+    *(strokes.charted, strokes.ways, smoothness.smoothness, smoothness.arcs),
     *(strokes.turning_points, strokes.swings, decimals.written),
     *(lying.tilts, lying.over_plane, lying.spreads, lying.over_feet, lying.stretched_lengths),
 )
 _ON_MESHES = (
     *(inverse.closest_along, inverse.feet, inverse.guesses, inverse.extents, inverse.mark),
-    inverse.settle,
+    *(inverse.settle, inverse.missed),
 )
 
 
@@ -41,6 +41,7 @@ def _load_strokes() -> None:
     t = np.linspace(0.0, 1.0, 9)
     p = np.ascontiguousarray(np.stack([t, t * t, 0.0 * t])[:, None])
     v, one, axes = np.zeros((1, 3)), np.ones(1), np.eye(3)[None].copy()
+    smoothness.arcs(v, v, one, 1.0, 1, np.empty(1))
     place = strokes.charted(p, v, axes)
     motions(t, p, v, v, compiled=True)
     Taught(t, p[:, 0].T, compiled=True).deviations(t, place, one)
@@ -66,6 +67,7 @@ def _load_on_meshes() -> None:
     inverse.feet(mesh.facets, v, near, one, limits, v, v, one, np.zeros((1, 1), dtype=bool))
     at = inverse.guesses(v, v, v, none, none, 0, one[0], v)
     inverse.extents(at)
+    inverse.missed(v, v, np.zeros((1, 1, 3, 3)), v, np.zeros((1, 1)))
     step, nodes = np.ones((1, 2)), np.zeros((1, 2, 2, 12))
     inverse.mark(np.zeros((1, 1, 1), dtype=bool), at, step, two, 0.0)
     inverse.settle(nodes, step, two, at, v, v, inverse.NewtonLimits(1, 1.0, 1.0, 1.0), True)

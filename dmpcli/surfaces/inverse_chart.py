@@ -153,7 +153,8 @@ def _whole(
 ) -> strip_inverse.Found:
     """Strokes that are found on strips, and stay on one turn about the part."""
     whole = strip_inverse.found(charts, given, course, nearest)
-    return whole.rows_of(~_jumps(whole.coordinates, given[whole.rows]))
+    there = given if len(whole.rows) == len(given) else given[whole.rows]
+    return whole.rows_of(~_jumps(whole.coordinates, there))
 
 
 def _nothing(samples: int) -> strip_inverse.Found:
@@ -215,9 +216,15 @@ def _of_strips(whole: strip_inverse.Found, shape: tuple[int, ...]) -> Inverse:
 
 def _jumps(coordinates: Floats, position: Floats) -> Booleans:
     """Tell which strokes (R, T, 3) seem to go on at another turn about the part, shape (R,)."""
-    step = np.linalg.norm(np.diff(coordinates[..., :2], axis=1), axis=-1)
-    way = np.linalg.norm(np.diff(position, axis=1), axis=-1)
-    return np.asarray((step > _JUMP * way + _LEAST_JUMP).any(axis=1))
+    step = np.diff(coordinates[..., :2], axis=1)
+    # Of most strokes no step is so long that the way need be known.
+    found = np.abs(step).max(axis=(1, 2)) > _LEAST_JUMP / np.sqrt(2.0)
+    rows = np.flatnonzero(found)
+    if len(rows):
+        way = np.linalg.norm(np.diff(position[rows], axis=1), axis=-1)
+        jumps = np.linalg.norm(step[rows], axis=-1) > _JUMP * way + _LEAST_JUMP
+        found[rows] = jumps.any(axis=1)
+    return np.asarray(found)
 
 
 def _by_steps(charts: Charts, given: Floats) -> Inverse:

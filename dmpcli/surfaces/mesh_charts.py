@@ -108,17 +108,21 @@ class MeshCharts:
         """
         shape = coordinates.shape
         foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
-        axes = np.broadcast_to(np.eye(3), (*shape[:2], 3, 3)).copy()
+        axes = np.empty((*shape[:2], 3, 3))
         outside, status = np.ones(shape[:2], dtype=bool), self.status.copy()
         face, stretch = np.full(shape[:2], -1), np.ones(shape[:2])
         unfolded = self.creased & (status == Status.DRAWN)
         smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
+        if len(smooth) < len(axes):
+            axes[:] = np.eye(3)
         if len(smooth):
             u, v = coordinates[smooth, :, 0], coordinates[smooth, :, 1]
             part = strip_chart.lift(self.mesh, self.centre.rows(smooth), u, v, walked)
             foot[smooth] = part.foot
             e_u = cross(part.across, part.normal)
-            axes[smooth] = np.stack([e_u, part.across, part.normal], axis=-1)
+            rows = smooth if len(smooth) < len(axes) else slice(None)
+            for i, column in enumerate((e_u, part.across, part.normal)):
+                axes[rows, :, :, i] = column
             outside[smooth], face[smooth], stretch[smooth] = part.outside, part.face, part.stretch
             status[smooth] = np.where(part.sharp, Status.DRAWN, part.status)
             unfolded[smooth[part.sharp]] = True

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Integers
-from dmpcli.spatial.vectors import across, dot, length, turned, unit
+from dmpcli.spatial.vectors import across, cross, dot, length, turned, unit
 from dmpcli.surfaces.surface import (
     ChartImage,
     ClosestPoints,
@@ -232,7 +232,7 @@ def open_axes(e_u: Floats, normal: Floats) -> Floats:
     """
     n = normal - np.sum(normal * e_u, axis=-1, keepdims=True) * e_u
     n = n / np.linalg.norm(n, axis=-1, keepdims=True)
-    return np.stack([np.broadcast_to(e_u, n.shape), np.cross(n, e_u), n], axis=-1)
+    return np.stack([np.broadcast_to(e_u, n.shape), cross(n, e_u), n], axis=-1)
 
 
 def closed_axes(normal: Floats) -> Floats:

@@ -61,6 +61,8 @@ class Found:
 
     def rows_of(self, which: Booleans) -> "Found":
         """Return some of them."""
+        if which.all():
+            return self
         return Found(self.rows[which], self.coordinates[which], self.axes[which], self.miss[which])
 
 
@@ -89,29 +91,40 @@ def found(
     """
     open_ = charts.lengths > 0.0
     rows = np.flatnonzero(open_ & ~charts.creased & (charts.status == Status.DRAWN))
-    if nearest is not None:
-        nearest = nearest[0][rows], nearest[1][rows]
-    foot, facet, height = _feet(charts.rows(rows), position[rows], nearest)
-    near = (np.abs(height) <= HIGHEST).all(axis=1) & np.isfinite(foot).all(axis=(1, 2))
-    rows, foot, facet, height = rows[near], foot[near], facet[near], height[near]
-    some = charts.rows(rows)
+    if len(rows) < len(position):
+        charts, position = charts.rows(rows), position[rows]
+        if nearest is not None:
+            nearest = nearest[0][rows], nearest[1][rows]
+    foot, facet, height = _feet(charts, position, nearest)
+    near = (np.abs(height).max(axis=1) <= HIGHEST) & np.isfinite(foot).all(axis=(1, 2))
+    if not near.all():
+        rows, foot, facet, height = rows[near], foot[near], facet[near], height[near]
+        charts, position = charts.rows(np.flatnonzero(near)), position[near]
     walked = None
     if charts.mesh.compiled:
         at, good, walked = strip_settling.settled(
-            some, foot, facet, _along_chord(some, foot), course
+            charts, foot, facet, _along_chord(charts, foot), course
         )
     else:
-        at = _guessed(some, foot)
-        good = _settled(some, at, foot, facet)
-    rows, height, at = rows[good], height[good], at[good]
+        at = _guessed(charts, foot)
+        good = _settled(charts, at, foot, facet)
+    if not good.all():
+        rows, height, at = rows[good], height[good], at[good]
+        charts, position = charts.rows(np.flatnonzero(good)), position[good]
     coordinates = np.concatenate([at, height[..., None]], axis=-1)
     if len(rows) == 0:
         shape = 0, position.shape[1]
         return Found(rows, coordinates, np.zeros((*shape, 3, 3)), np.zeros(shape))
-    lift = charts.rows(rows).lift(coordinates, walked)
-    gap = np.einsum("btj,btjk->btk", position[rows] - lift.position, lift.axes)
-    coordinates[..., 2] += gap[..., 2]
-    miss = np.hypot(gap[..., 0], gap[..., 1])
+    lift = charts.lift(coordinates, walked)
+    miss = np.empty(position.shape[:2])
+    if charts.mesh.compiled:
+        from dmpcli.surfaces.kernels import inverse
+
+        inverse.missed(position, lift.position, lift.axes, coordinates, miss)
+    else:
+        gap = np.einsum("btj,btjk->btk", position - lift.position, lift.axes)
+        coordinates[..., 2] += gap[..., 2]
+        np.hypot(gap[..., 0], gap[..., 1], out=miss)
     whole = ((miss <= SETTLED) & ~lift.outside).all(axis=1)
     whole &= (lift.status == Status.DRAWN) & ~lift.unfolded
     return Found(rows, coordinates, lift.axes, miss).rows_of(whole)

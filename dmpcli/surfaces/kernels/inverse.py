@@ -369,3 +369,21 @@ def settle(
             guess[b, k, 0], guess[b, k, 1] = u, v
             still[b] &= known
     return still
+
+
+@kernel
+def missed(position: Floats, lifted: Floats, axes: Floats, at: Floats, miss: Floats) -> None:
+    """Move w of coordinates `at` (B, T, 3) up to positions (B, T, 3); how far these lie beside.
+
+    `lifted` is what the coordinates lead to, with `axes` (B, T, 3, 3) there; `miss` is (B, T), mm.
+    """
+    for b in range(len(at)):
+        for k in range(at.shape[1]):
+            u, v, w = 0.0, 0.0, 0.0
+            for i in range(3):
+                gap = position[b, k, i] - lifted[b, k, i]
+                u += gap * axes[b, k, i, 0]
+                v += gap * axes[b, k, i, 1]
+                w += gap * axes[b, k, i, 2]
+            at[b, k, 2] += w
+            miss[b, k] = math.sqrt(u * u + v * v)
