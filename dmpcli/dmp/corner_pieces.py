@@ -328,30 +328,3 @@ def joined(pieces: list[SmoothPiece], smooth: list[int]) -> tuple[Floats, Floats
         slopes.append(piece.ends[:, 1] + np.tensordot(piece.covariance[:, 1], pull, 2))
     jumps = [after[0] - before[1] for before, after in pairwise(slopes)]
     return np.concatenate(parts), np.array(jumps)
-
-
-def rounding(count: int, corners: Floats, jumps: Floats, sigma: float) -> Floats:
-    """What rounding corners by σ at their tips adds to the values, shape (T, D).
-
-    Samples hardly tell a sharper corner from it, and an arm is accelerated the less.
-
-    Parameters
-    ----------
-    count : int
-        T.
-    corners : array, shape (P,)
-        Times, in samples.
-    jumps : array, shape (P, D)
-        Of the velocity, by samples.
-    sigma : float
-    """
-    j = np.arange(count)
-    added = np.zeros((count, jumps.shape[1]))
-    legs = np.diff(np.concatenate([[0.0], corners, [count - 1.0]]))
-    for i, (at, jump) in enumerate(zip(corners.tolist(), jumps, strict=True)):
-        # Uniformly from one velocity to the other within ± half, that goes inside by jump·half/4.
-        half = 4.0 * sigma / max(float(np.linalg.norm(jump)), 1e-300)
-        half = min(half, 0.5 * float(legs[i : i + 2].min()))
-        near = slice(int(np.ceil(at - half)), int(np.floor(at + half)) + 1)
-        added[near] += (half - np.abs(j[near] - at))[:, None] ** 2 / (4.0 * half) * jump
-    return added

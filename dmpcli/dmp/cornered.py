@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from dmpcli.arrays import Floats
-from dmpcli.dmp import corner_pieces, corner_search
+from dmpcli.arrays import Floats, Integers
+from dmpcli.dmp import corner_blends, corner_pieces, corner_search
 from dmpcli.dmp.corner_pieces import COST, SmoothPiece
 from dmpcli.dmp.corner_search import Candidate
 from dmpcli.dmp.least_squares import Design
@@ -19,6 +19,8 @@ from dmpcli.dmp.noise import ROUNDING, Noise
 
 # Samples up to which corners are looked for.
 _MOST = 50_000
+# Rounds of looking for corners and what rounds them.
+_ROUNDS = 3
 # Coefficients up to which two pieces are plain, and squares beyond those of noise, in variances,
 # that a polynomial of more leaves where no spline that does better costs as little as they.
 _PLAIN, _FAR = 6.0, 200.0
@@ -92,25 +94,70 @@ def cornered(
     at = pieces.needed(at)
     if len(at) == 0:
         return None
-    at = corner_search.located(x, [(float(place), 1.0) for place in at], noise)
-    best = pieces.all(at)
+    meeting, blends = None, np.zeros_like(x)
+    for _ in range(_ROUNDS):
+        # Without what is rounded, corners are where they would be.
+        without = x - blends
+        at = corner_search.located(without, [(float(place), 1.0) for place in at], noise)
+        meeting = _met(without, at, noise, variance, breaks)
+        if meeting is None:
+            return None
+        sharp = meeting.smooth == 1
+        corners, jumps = at[sharp], meeting.jumps[sharp]
+        least = corner_blends.least(len(x), corners, jumps, noise.typical)
+        halves = corner_blends.likely(x - meeting.values, corners, jumps, noise.typical, False)
+        long = halves > least
+        blends = corner_blends.added(len(x), corners[long], jumps[long], halves[long])
+        if not long.any():
+            break
+    assert meeting is not None
+    residual = x - meeting.values - blends
+    cost = float(np.sum(residual**2)) / variance + COST * meeting.size + _places(len(at), x)
+    if cost >= smooth or not corner_pieces.explained(residual, noise):
+        return None
+    halves = corner_blends.likely(x - meeting.values, corners, jumps, noise.typical, True)
+    values = meeting.values + corner_blends.added(len(x), corners, jumps, halves)
+    return Cornered(values, corners, meeting.size, meeting.finest, meeting.rests)
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """Pieces that meet at corners, without what these are rounded by.
+
+    Attributes
+    ----------
+    values : array, shape (T, D)
+    jumps : array, shape (P, D)
+        Of the velocity, by samples.
+    smooth : array, shape (P,)
+        As `corner_pieces.joint` tells.
+    size, finest, rests
+        As of `Cornered`.
+    """
+
+    values: Floats
+    jumps: Floats
+    smooth: Integers
+    size: float
+    finest: float
+    rests: tuple[bool, bool]
+
+
+def _met(x: Floats, at: Floats, noise: Noise, variance: float, breaks: Floats) -> _Meeting | None:
+    """Fit pieces between corners that meet; None where nothing explains one, or they cannot."""
+    best = _KeptPieces(x, noise, variance, breaks).all(at)
     if best is None:
         return None
-    smooth_at = [corner_pieces.joint(*two, variance)[0] for two in pairwise(best)]
+    smooth = [corner_pieces.joint(*two, variance)[0] for two in pairwise(best)]
     try:
-        values, jumps = corner_pieces.joined(best, smooth_at)
+        values, jumps = corner_pieces.joined(best, smooth)
     except np.linalg.LinAlgError:
         # Pieces of a few samples each cannot meet in all that.
         return None
-    residual = x - values
-    size = sum(piece.size for piece in best) - sum(smooth_at)
-    cost = float(np.sum(residual**2)) / variance + COST * size + _places(len(at), x)
-    if cost >= smooth or not corner_pieces.explained(residual, noise):
-        return None
-    sharp = np.array(smooth_at) == 1
-    values += corner_pieces.rounding(len(x), at[sharp], jumps[sharp], noise.typical)
+    size = sum(piece.size for piece in best) - sum(smooth)
     finest = max(piece.size / len(piece.values) for piece in best)
-    return Cornered(values, at[sharp], size, finest, (best[0].rests[0], best[-1].rests[1]))
+    rests = (best[0].rests[0], best[-1].rests[1])
+    return _Meeting(values, jumps, np.array(smooth), size, finest, rests)
 
 
 def _dear(found: list[Candidate], x: Floats, noise: Noise, variance: float, smooth: float) -> bool:

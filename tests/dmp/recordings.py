@@ -61,6 +61,26 @@ def corners():
     return t, np.column_stack([np.interp(50 * t, way, c) for c in V.T])
 
 
+def blended(seed, seconds, rate=100.0):
+    """Legs at one speed that turn within so many seconds: times, points, largest acceleration."""
+    rng = np.random.default_rng(seed)
+    legs = int(rng.integers(3, 8))
+    turn = rng.choice([-1.0, 1.0], legs) * rng.uniform(np.radians(20), np.radians(150), legs)
+    heading = np.cumsum(turn)
+    way = np.column_stack([np.cos(heading), np.sin(heading), rng.normal(0.0, 0.3, legs)])
+    v = rng.uniform(20.0, 80.0) * way / np.linalg.norm(way, axis=1, keepdims=True)
+    lasts = rng.uniform(0.6, 1.5, legs)
+    t = times(lasts.sum() - 0.01, rate)
+    points = v[0] * t[:, None]
+    for end, change in zip(np.cumsum(lasts)[:-1], np.diff(v, axis=0), strict=True):
+        # The integral of a velocity that changes linearly over that time.
+        u = np.clip((t - end) / seconds + 0.5, 0.0, 1.0)
+        points += (seconds * 0.5 * u**2 + np.maximum(t - end - 0.5 * seconds, 0.0))[
+            :, None
+        ] * change
+    return t, points, np.linalg.norm(np.diff(v, axis=0), axis=1).max() / seconds
+
+
 def pen_lift():
     """Two strokes on z = 0 with the pen lifted by 8 mm between."""
     t = times(9.0)

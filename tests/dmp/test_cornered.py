@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from dmpcli.dmp import corner_pieces, corner_search, least_squares, noise, spline_ends
+from dmpcli.dmp import (
+    corner_blends,
+    corner_pieces,
+    corner_search,
+    least_squares,
+    noise,
+    spline_ends,
+)
 from dmpcli.dmp.noise import Noise
 from dmpcli.dmp.spline_smoothing import smooth
-from tests.dmp.recordings import corners, jerk, letters, noisy, six_seconds
+from tests.dmp.recordings import blended, corners, jerk, letters, noisy, six_seconds
 
 
 def smoothed(t, points):
@@ -136,6 +143,48 @@ def test_a_corner_is_found_to_a_part_of_a_sample(place):
     at = corner_search.located(points, found, white)
     # ± 3 standard deviations of where two lines of 60 samples meet.
     assert abs(at[0] - place) <= 3.0 * 0.02 * np.sqrt(8.0 / 60.0) / 0.8
+
+
+@pytest.mark.slow
+def test_a_rounded_corner_that_is_taken_for_one_is_rounded_as_its_samples_are():
+    """By 0.1 s, at 0.5 mm of noise: taken for sharp it would be accelerated twice as much."""
+    peaks, off_by = [], []
+    for seed in range(9300, 9316):
+        t, truth, peak = blended(seed, 0.1)
+        spline = smoothed(t, noisy(truth, 0.5, seed))
+        peaks.append(np.linalg.norm(spline(t, 2), axis=1).max() / peak)
+        off_by.append(off(spline, t, truth, 0.5).max())
+    assert np.median(peaks) <= 1.5
+    assert max(off_by) <= 4.0
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("half", [6.0, 9.5])
+def test_a_blend_is_as_long_as_the_samples_tell(half, sigma):
+    j = np.arange(121.0)
+    jump = np.array([[0.3, 1.5, 0.0]])
+    corners = np.array([60.3])
+    ramp = np.maximum(np.minimum(j - 60.3 + half, 2.0 * half), 0.0)
+    blend = ramp**2 / (4.0 * half) + np.maximum(j - 60.3 - half, 0.0)
+    inside = (blend - np.maximum(j - 60.3, 0.0))[:, None] * jump
+    added = corner_blends.added(121, corners, jump, np.array([half]))
+    np.testing.assert_allclose(added, inside, atol=1e-12)
+    found = corner_blends.likely(noisy(inside, sigma, 3), corners, jump, sigma, False)
+    # The likeliest by its tip, jump · half / 4, which the samples beside it tell within σ.
+    assert abs(found[0] - half) * np.linalg.norm(jump) / 4.0 <= sigma + 0.08 * half * 0.38
+
+
+def test_a_sharp_corner_is_rounded_by_what_cannot_be_told_at_most():
+    """By σ at its tip, and where the samples do not speak against it by twice that."""
+    jump, corners = np.array([[0.0, 0.9, 0.0]]), np.array([50.4])
+    least = corner_blends.least(101, corners, jump, 0.5)
+    assert least * 0.9 / 4.0 == pytest.approx(0.5)
+    for seed in range(20):
+        rest = noisy(np.zeros((101, 3)), 0.5, seed)
+        assert corner_blends.likely(rest, corners, jump, 0.5, False) == least
+        assert least <= corner_blends.likely(rest, corners, jump, 0.5, True) <= 2.0 * least
+    # No farther than half of the shorter leg.
+    assert corner_blends.least(101, np.array([2.0]), jump, 0.5) == 1.0
 
 
 def test_noise_alone_has_no_corners():
