@@ -36,7 +36,7 @@ def least(count: int, corners: Floats, jumps: Floats, sigma: float) -> Floats:
     sigma : float
     """
     sizes = np.maximum(np.linalg.norm(jumps, axis=1), 1e-300)
-    return np.minimum(4.0 * sigma / sizes, _room(count, corners))
+    return np.asarray(np.minimum(4.0 * sigma / sizes, _room(count, corners)))
 
 
 def likely(residual: Floats, corners: Floats, jumps: Floats, sigma: float, longest: bool) -> Floats:

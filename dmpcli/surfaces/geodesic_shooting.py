@@ -14,7 +14,7 @@ from dmpcli.surfaces import (
     straightest_geodesics,
 )
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
-from dmpcli.surfaces.walked_course import Course
+from dmpcli.surfaces.walked_nodes import WalkedNodes
 
 # Steps of the centre line are no longer than this, mm, and there are at least four.
 STEP = 6.5
@@ -85,14 +85,14 @@ class Ends:
     normal: Floats
     sharp: Booleans
     off: Booleans
-    course: Course | None = None
+    course: WalkedNodes | None = None
 
     @classmethod
     def unknown(cls, count: int, nodes: int = 0) -> "Ends":
         """Return ends to be filled in, with so many nodes of their courses."""
         a, b, c = np.zeros((3, count, 3))
         sharp, off = np.zeros((2, count), dtype=bool)
-        return cls(a, b, c, sharp, off, Course.unknown(count, nodes) if nodes else None)
+        return cls(a, b, c, sharp, off, WalkedNodes.unknown(count, nodes) if nodes else None)
 
     def fill(self, rows: Integers, other: "Ends", which: Booleans) -> None:
         """Put some rows of other ends into these.
@@ -135,14 +135,14 @@ def by_steps(mesh: TriangleMesh, aim: Aim) -> Ends:
             ends.fill(doubtful, again, np.ones(len(doubtful), dtype=bool))
         return ends
     front, behind = geodesic_stepping.start(mesh, *begun)
-    return _walked(mesh, front, aim.steps, Course.begun(front, behind, aim.steps))
+    return _walked(mesh, front, aim.steps, WalkedNodes.begun(front, behind, aim.steps))
 
 
 def _walked(
     mesh: TriangleMesh,
     front: geodesic_stepping.Front,
     steps: Integers,
-    course: Course | None = None,
+    course: WalkedNodes | None = None,
 ) -> Ends:
     ends = replace(Ends.unknown(len(steps)), course=course)
     sharp, off = ends.sharp.copy(), ends.off.copy()

@@ -20,7 +20,7 @@ from dmpcli.surfaces.sampled_chart import closed_direction, goal_coordinates, wa
 from dmpcli.surfaces.strip_grid import Centre
 from dmpcli.surfaces.surface import ChartImage, Geodesics, Status, first_refusal, towards
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
-from dmpcli.surfaces.walked_course import Course
+from dmpcli.surfaces.walked_nodes import WalkedNodes
 
 # Start and goal nearer to each other than this have no direction, mm.
 COINCIDENT = 1e-6
@@ -340,7 +340,7 @@ class Link:
     length: Floats
     status: Integers
     creased: Booleans
-    course: Course | None = None
+    course: WalkedNodes | None = None
 
 
 def connect(mesh: TriangleMesh, centre: Centre, goal: Floats, status: Integers) -> Link:

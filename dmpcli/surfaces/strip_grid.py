@@ -9,7 +9,7 @@ from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.spatial.vectors import cross, dot, unit
 from dmpcli.surfaces import compiled_stepping, geodesic_stepping
 from dmpcli.surfaces.triangle_mesh import TriangleMesh
-from dmpcli.surfaces.walked_course import Course
+from dmpcli.surfaces.walked_nodes import WalkedNodes
 
 # Central fourth-order differences, and their one-sided forms for the two nodes at either end.
 _SLOPES = (
@@ -38,7 +38,7 @@ class Centre:
         Of the nodes along u, mm.
     sign : array, shape (B, 1)
     part : array of int, shape (B,)
-    course : Course, optional
+    course : WalkedNodes, optional
         Nodes ahead that were walked to find the goal.
     """
 
@@ -48,7 +48,7 @@ class Centre:
     step: Floats
     sign: Floats
     part: Integers
-    course: Course | None = None
+    course: WalkedNodes | None = None
 
     def rows(self, rows: Integers) -> "Centre":
         """Return some of the charts."""
@@ -352,7 +352,7 @@ class _Lines:
         at: int,
         counts: tuple[Integers, Integers],
         centre: Centre,
-        course: Course,
+        course: WalkedNodes,
     ) -> None:
         """Fill nodes as `walk` does, those ahead with what was walked before as far as it goes."""
         ahead, behind = counts

@@ -1,4 +1,4 @@
-"""The course of shots: what the last shot from start to goal walked is the chart's centre line."""
+"""Nodes that shots walked: the last shot from start to goal is the chart's centre line."""
 
 from dataclasses import dataclass, fields
 from typing import Self
@@ -10,7 +10,7 @@ from dmpcli.surfaces.geodesic_stepping import Front, Marks
 
 
 @dataclass(frozen=True)
-class Course:
+class WalkedNodes:
     """Nodes of B walks, S at most, the first of them one step from the start.
 
     Attributes
@@ -72,7 +72,7 @@ class Course:
         self.sharp[rows, node], self.back[rows, node] = marks.sharp, marks.back
         self.trend[rows] = front.trend
 
-    def fill(self, rows: Integers, other: "Course | None", which: Booleans) -> None:
+    def fill(self, rows: Integers, other: "WalkedNodes | None", which: Booleans) -> None:
         """Put some rows of other courses into these; without any, forget these rows."""
         if other is None:
             self.step[rows] = 0.0
@@ -85,9 +85,9 @@ class Course:
             else:
                 mine[rows] = theirs[which]
 
-    def rows(self, rows: Integers) -> "Course":
+    def rows(self, rows: Integers) -> "WalkedNodes":
         """Return some of the courses."""
-        return Course(*(getattr(self, field.name)[rows] for field in fields(self)))
+        return WalkedNodes(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def begin_as(self, heading: Floats, step: Floats) -> bool:
         """Tell whether all walks of these headings (B, 3) and steps (B, 1), mm, are known."""
