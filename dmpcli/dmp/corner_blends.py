@@ -15,7 +15,7 @@ _STEP = 1.15
 _SHORTEST = 2.0
 # What one that is clearly likelier costs less, and one that is about as likely more, in variances
 # of one axis.
-_CLEARLY, _AS_LIKELY = 9.0, 1.0
+_CLEARLY, _AS_LIKELY = 6.0, 1.0
 # Times the least that one is at most which is not clearly likelier.
 _UNSEEN = 2.0
 # Of the shorter leg beside a corner, what a blend takes at most.
@@ -91,7 +91,7 @@ def added(count: int, corners: Floats, jumps: Floats, halves: Floats) -> Floats:
 
 def _room(count: int, corners: Floats) -> Floats:
     legs = np.diff(np.concatenate([[0.0], corners, [count - 1.0]]))
-    return _SHARE * np.minimum(legs[:-1], legs[1:])
+    return np.asarray(_SHARE * np.minimum(legs[:-1], legs[1:]))
 
 
 def _near(at: float, half: float) -> slice:
@@ -101,4 +101,4 @@ def _near(at: float, half: float) -> slice:
 def _inside(near: slice, at: float, halves: Floats) -> Floats:
     """Shares of the jump that blends add to samples, shape (S, n)."""
     distance = np.abs(np.arange(near.start, near.stop) - at)
-    return np.maximum(halves[:, None] - distance, 0.0) ** 2 / (4.0 * halves[:, None])
+    return np.asarray(np.maximum(halves[:, None] - distance, 0.0) ** 2 / (4.0 * halves[:, None]))
