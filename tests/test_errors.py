@@ -95,5 +95,10 @@ def test_no_refusal_rounds_a_number_onto_its_bound(refuse, told):
 
 
 def test_a_skills_mark_names_two_lengths_that_differ():
-    said = tolerance_mark.text("a", {"rms": 0.02, "largest": 0.10004, "tolerance": 0.1})
-    assert "largest 0.10004 mm, beyond its tolerance of 0.1 mm" in said
+    said = tolerance_mark.text("a", {"rms": 0.02, "largest": 0.40004, "tolerance": 0.1})
+    assert "largest 0.40004 mm, beyond its tolerance of 0.1 mm, 0.4 mm anywhere" in said
+
+
+def test_a_skills_mark_does_not_call_a_path_beyond_that_is_within():
+    said = tolerance_mark.text("a", {"rms": 0.004, "largest": 0.074, "tolerance": 0.1})
+    assert "keeps the path, RMS 0.004 mm, largest 0.074 mm, but not the wave height" in said

@@ -16,6 +16,10 @@ _NOTABLE = 0.03
 # Another shape: its RMS distance is this part of the extent. Of the 26 shapes of the LASA set that
 # people drew seven times, no stroke is so far from the others.
 _SHAPE = 0.25
+# Shapes whose mean path is shorter than the shortest of them by more than this part cancel each
+# other: a bulge to the left and one to the right. Of people's strokes of one shape the mean loses
+# 3 % at most.
+_CANCELLED = 0.07
 # An outlier is this many times as far from the others as they are from each other (of the LASA
 # set's strokes, taken by three, about one group in a hundred has one; taken by seven, none) ...
 _OUTLYING = 5.0
@@ -165,6 +169,8 @@ def reversals(x: Floats) -> list[Doubt]:
 def strangers(x: Floats, noise: Floats, apart_from: Integers) -> list[Doubt]:
     """Find demonstrations of another shape, and outliers.
 
+    Of another shape is also the farthest of some whose mean is no stroke of theirs, however small
+    their distances: two waves to either side are half their height apart, and their mean is a line.
     An outlier is far from the others by S_n's measure of scatter (Rousseeuw and Croux, J. Am. Stat.
     Assoc. 88(424), 1993, 1273-1283): its median distance to all, itself included, is `_OUTLYING`
     times the median of such distances. It takes three to tell.
@@ -198,7 +204,17 @@ def strangers(x: Floats, noise: Floats, apart_from: Integers) -> list[Doubt]:
             doubts.append(Doubt(i, "shape", float(away[k])))
         elif len(judged) > 2 and typical[k] > max(_OUTLYING * float(np.median(typical)), floor):
             doubts.append(Doubt(i, "outlier", float(away[k])))
+    if not doubts and _cancelled(x[judged]):
+        k = int(np.argmax(apart[:, midst]))
+        doubts.append(Doubt(int(judged[k]), "shape", float(away[k])))
     return doubts
+
+
+def _cancelled(x: Floats) -> bool:
+    """Whether the mean path is clearly shorter than any of the paths (n, M, D)."""
+    steps = np.diff(np.concatenate([x, pooled_mean(x)[None]]), axis=1)
+    *lengths, mean = np.linalg.norm(steps, axis=2).sum(axis=1).tolist()
+    return mean < (1.0 - _CANCELLED) * min(lengths)
 
 
 def _rms(difference: Floats) -> float:

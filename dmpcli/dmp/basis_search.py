@@ -15,15 +15,13 @@ from dmpcli.dmp import end_conditions
 from dmpcli.dmp.canonical_system import Basis
 from dmpcli.dmp.curve import Curve
 from dmpcli.dmp.forced_model import forced_model
-from dmpcli.dmp.options import MOST, Method, WidthRule
+from dmpcli.dmp.options import LARGEST, MOST, Method, WidthRule
 from dmpcli.dmp.regression import target_forcing
 from dmpcli.dmp.transformation_system import TransformationGains
 from dmpcli.metrics.wave_height import LINE, wave_heights
 
 FIRST = 80
 PASSES = 3
-# Largest deviation, in tolerances.
-LARGEST = 4.0
 # Deviation of the tool's orientation that is always allowed, rad.
 ANGLE = np.radians(0.1)
 # N may be so many times the pieces that the recording's band holds.

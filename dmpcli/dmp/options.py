@@ -34,6 +34,9 @@ TOLERANCE = 0.1
 TOLERANCE_SHARE = 0.002
 """... and as a share of the diagonal of the stroke's bounding box; the smaller one counts."""
 
+LARGEST = 4.0
+"""Largest deviation anywhere, in tolerances."""
+
 PAPER_BASIS = 80
 """N of the paper."""
 

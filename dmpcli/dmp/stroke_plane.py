@@ -2,8 +2,8 @@
 
 A person draws on something flat, lifts the pen, holds the tool aslant, or draws a line that tells
 no plane at all. Least squares tilts by 4° over a pen lift; least *absolute* offsets do not, as long
-as most of the path lies in the plane. The tool's axis tells the side, and decides where the path
-does not.
+as the pen is not lifted where the stroke swings out farthest: then the plane that holds most of the
+path is the one. The tool's axis tells the side, and decides where the path does not.
 """
 
 from collections.abc import Sequence
@@ -35,6 +35,8 @@ ONE_SIDED = 3.0
 UPRIGHT = 0.5
 # Points of each stroke, even along its path.
 _POINTS = 250
+# A plane that holds so much more of the path than that of least absolute offsets is the stroke's.
+_MORE = 0.1
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,10 @@ def stroke_planes(
         normals = np.stack([s.across(p) for s, p in zip(strokes, preferred, strict=True)])
         rule: Rule = "tool" if len(known) == len(tools) else "base"
         return StrokePlane(normals, rule, _lean(normals, tools), 0.0, rule == "base")
-    common = _common_line(strokes)
-    own = np.stack([_least_absolute(s.q, s.e_u) for s in strokes])
-    normals, pooled, apart = _fitted(strokes, own, common)
     near = max(IN_PLANE, NOISE * noise)
+    found = [_through_most(s.q, s.e_u, near) for s in strokes]
+    own = np.stack([n for n, _ in found])
+    normals, pooled, apart = _fitted(strokes, own, [flat for _, flat in found])
     normals, own = _alike(normals), _alike(own)
     inside = min(
         float(np.mean(np.abs(s.heights(n)) <= near)) for s, n in zip(strokes, own, strict=True)
@@ -182,39 +184,73 @@ class _Offsets:
         return h - np.median(h) if self.e_u is None else h
 
 
-def _common_line(strokes: Sequence[_Offsets]) -> Floats | None:
-    """Return the mean direction of open strokes; None of closed ones, or where there is none."""
-    lines = [s.e_u for s in strokes if s.e_u is not None]
-    if not lines:
-        return None
-    mean = np.mean(lines, axis=0)
-    size = np.linalg.norm(mean)
-    return mean / size if size > 0.1 else None
+def _ways(lines: Floats) -> Floats:
+    """Directions (n, 3) of lines (n, 3) that run alike: there or back, as most of them do."""
+    main = np.linalg.eigh(lines.T @ lines)[1][:, 2]
+    main = main if np.sum(lines @ main) >= 0.0 else -main
+    return np.where((lines @ main < 0.0)[:, None], -lines, lines)
 
 
 def _fitted(
-    strokes: Sequence[_Offsets], own: Floats, common: Floats | None
+    strokes: Sequence[_Offsets], own: Floats, flat: Sequence[Floats]
 ) -> tuple[Floats, bool, float]:
     """Normals (n, 3) of one plane for all, or each its own; and how far apart, degrees."""
     if len(strokes) == 1:
         return own, True, 0.0
-    closed = strokes[0].e_u is None
-    if not closed and common is None:
-        return own, False, 180.0
-    # Each stroke is turned about the smallest angle that lays its line upon the mean one.
-    laid = [s.q if s.e_u is None or common is None else turned(s.q, s.e_u, common) for s in strokes]
-    pooled = _least_absolute(np.concatenate(laid), common)
-    normals = np.stack(
-        [
-            pooled if s.e_u is None or common is None else turned(pooled, common, s.e_u)
-            for s in strokes
-        ]
-    )
+    lines = [s.e_u for s in strokes if s.e_u is not None]
+    if not lines:
+        pooled = _least_absolute(np.concatenate(flat), None)
+        normals = np.tile(pooled, (len(strokes), 1))
+    else:
+        # Each stroke is turned about the smallest angle that lays its line upon the mean one, there
+        # or back: a stroke that was drawn the other way lies in the same plane.
+        ways = _ways(np.stack(lines))
+        common = np.mean(ways, axis=0)
+        common /= np.linalg.norm(common)
+        laid = [turned(q, way, common) for q, way in zip(flat, ways, strict=True)]
+        pooled = _least_absolute(np.concatenate(laid), common)
+        normals = np.stack([turned(pooled, common, way) for way in ways])
     # A nearly straight demonstration has no normal of its own to differ.
     told = [s.spread >= STRAIGHT * s.extent for s in strokes]
     cosines = np.abs(np.sum(normals * own, axis=1))[told]
     apart = float(np.degrees(np.arccos(np.clip(cosines.min(initial=1.0), 0.0, 1.0))))
     return (normals, True, apart) if apart <= APART else (own, False, apart)
+
+
+def _through_most(q: Floats, e_u: Floats | None, near: float) -> tuple[Floats, Floats]:
+    """Unit normal of the plane of least absolute offsets, or of one that holds clearly more points.
+
+    A pen that is lifted where the stroke swings out farthest outweighs what lies in the plane: the
+    least sum of offsets then leans, though most of the path is flat.
+
+    Parameters
+    ----------
+    q : array, shape (P, 3)
+        mm.
+    e_u : array, shape (3,), or None
+        As `_least_absolute`.
+    near : float
+        Points this near to a plane are in it, mm.
+
+    Returns
+    -------
+    normal : array, shape (3,)
+    flat : array, shape (K, 3)
+        The points that told it, mm: all, or those in the plane.
+    """
+    normal = _least_absolute(q, e_u)
+    # What lies near the line is in each of its planes.
+    telling = q[np.linalg.norm(q, axis=1) > near]
+    share = float(np.mean(np.abs(telling @ normal) <= near)) if len(telling) else 1.0
+    if e_u is None or share > 1.0 - _MORE:
+        # Through a closed curved stroke there are many planes.
+        return normal, q
+    candidates = np.cross(e_u, telling)
+    candidates /= np.linalg.norm(candidates, axis=1, keepdims=True)
+    held = np.abs(candidates @ telling.T) <= near
+    most = held[int(held.sum(axis=1).argmax())]
+    better = most.mean() >= max(0.5, share + _MORE)
+    return (_least_absolute(telling[most], e_u), telling[most]) if better else (normal, q)
 
 
 def _least_absolute(q: Floats, e_u: Floats | None) -> Floats:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from dmpcli.dmp.options import LARGEST
 from dmpcli.errors import beside
 
 if TYPE_CHECKING:
@@ -10,6 +11,9 @@ if TYPE_CHECKING:
     from dmpcli.records.skill import Reached, SkillFile
 
 FACT = "beyond_tolerance"
+
+ANGLE = 0.1
+"""Tolerance of the tool's turn, degrees."""
 
 
 def of_reached(reached: "Accuracy | Reached | None") -> dict[str, float] | None:
@@ -32,10 +36,32 @@ def of_facts(facts: Mapping[str, Any]) -> dict[str, float] | None:
 
 def text(name: str, mark: Mapping[str, float]) -> str:
     """Say it in one line, with the remedy."""
-    largest, tolerance = mark["largest"], mark["tolerance"]
     return (
-        f"{name}: the skill strays from what was demonstrated by RMS {mark['rms']:.3g} mm, largest "
-        f"{beside(largest, tolerance, '.3g')} mm, beyond its tolerance of "
-        f"{beside(tolerance, largest, '.3g')} mm; fit it "
-        "again with --regression ridge, or a --tolerance that will do"
+        f"{name}: {strays(mark, 'the wave height or the turn of the tool')}; fit it again with "
+        "--regression ridge, or a --tolerance that will do"
+    )
+
+
+def strays(mark: Mapping[str, float], else_: str, also: str = "") -> str:
+    """Say by how much a skill is beyond its tolerance.
+
+    Parameters
+    ----------
+    mark : mapping
+    else_ : str
+        What is beyond it where the path is not.
+    also : str, optional
+        What is beyond it beside the path.
+    """
+    rms, largest, tolerance = mark["rms"], mark["largest"], mark["tolerance"]
+    anywhere = LARGEST * tolerance
+    if rms <= tolerance and largest <= anywhere:
+        return (
+            f"the skill keeps the path, RMS {rms:.3g} mm, largest {largest:.3g} mm, but not "
+            f"{else_} within its tolerance of {tolerance:.3g} mm and {ANGLE:g}°"
+        )
+    return (
+        f"the skill strays from what was demonstrated by RMS {beside(rms, tolerance, '.3g')} mm, "
+        f"largest {beside(largest, anywhere, '.3g')} mm{also}, beyond its tolerance of "
+        f"{beside(tolerance, rms, '.3g')} mm, {beside(anywhere, largest, '.3g')} mm anywhere"
     )

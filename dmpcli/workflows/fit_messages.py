@@ -8,6 +8,7 @@ import numpy as np
 from dmpcli.dmp.options import MOST
 from dmpcli.dmp.stroke_plane import LEANING
 from dmpcli.errors import counted
+from dmpcli.records import tolerance_mark
 
 if TYPE_CHECKING:
     from dmpcli.dmp.alignment import Alignment
@@ -305,19 +306,28 @@ def _of_tolerance(result: "Fit") -> Iterator[str]:
             "raise --cutoff, or leave it out"
         )
         return
-    wave = next((r.wave for r in result.reproductions if r.wave is not None), None)
-    heights = "" if wave is None else f", wave {wave[1]:.2f} mm of {wave[0]:.2f}"
     remedy = "ask for a --tolerance that will do"
     if result.alternative is not None:
         count, rms = result.alternative
         remedy = f"--regression ridge reaches RMS {rms:.3g} mm with N = {count}"
     elif len(result.skill.basis) < MOST:
         remedy = f"raise --basis, or leave it to --basis auto; or {remedy}"
-    yield (
-        f"the skill strays from what was demonstrated by RMS {reached.rms:.3g} mm, largest "
-        f"{reached.largest:.3g} mm{heights}, beyond its tolerance of {reached.tolerance:.3g} mm; "
-        f"{remedy}"
+    missed = list(_missed(result, reached.tolerance))
+    said = tolerance_mark.strays(
+        vars(reached), " and ".join(missed) or "its ends", "".join(f", {m}" for m in missed)
     )
+    yield f"{said}; {remedy}"
+
+
+def _missed(result: "Fit", tolerance: float) -> Iterator[str]:
+    """Yield what of a stroke but its path is beyond the tolerance, mm."""
+    waves = [r.wave for r in result.reproductions if r.wave is not None]
+    there, here = max(waves, key=lambda wave: abs(wave[1] - wave[0]), default=(0.0, 0.0))
+    if abs(here - there) > tolerance:
+        yield f"wave {here:.2f} mm of {there:.2f}"
+    angle = float(np.degrees(max(r.angle for r in result.reproductions)))
+    if angle > tolerance_mark.ANGLE:
+        yield f"the tool's turn by up to {angle:.2g}°"
 
 
 def _of_force(skill: "Skill") -> Iterator[str]:

@@ -93,3 +93,15 @@ def test_one_between_two_that_run_the_other_way_each_in_another_manner_is_the_on
     """One is recorded backward, the other seen in its own chart: far apart, and both against it."""
     others = [PATH[::-1], backwards(PATH)]
     assert told([PATH, *others]) == [(0, "opposite")]
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_two_waves_to_either_side_are_told_though_they_are_near(n):
+    """Their mean is a straight line, and they are less than a quarter of the extent apart."""
+    wave = np.column_stack([190 * U, 31 * np.sin(4 * np.pi * U), 0 * U])
+    x = np.array([wave] * n + [wave * [1.0, -1.0, 1.0]])
+    assert agreement._apart(x)[0, -1] < 0.25 * np.linalg.norm([190, 62])
+    found = agreement.strangers(x, np.full(n + 1, 0.05), np.empty(0, dtype=int))
+    assert n in [doubt.index for doubt in found]
+    higher = np.array([wave] * n + [wave * [1.0, 1.2, 1.0]])
+    assert agreement.strangers(higher, np.full(n + 1, 8.0), np.empty(0, dtype=int)) == []

@@ -142,6 +142,34 @@ def test_the_order_of_demonstrations_gives_the_same_normals(order):
     np.testing.assert_allclose(mixed, plain[list(order)], atol=1e-12)
 
 
+@pytest.mark.parametrize("tool", [None, tilted(20.0), tilted(-40.0, "y")])
+@pytest.mark.parametrize("height", [8.0, 11.0, 40.0])
+def test_a_lift_where_the_stroke_swings_out_farthest_tilts_nothing(tool, height):
+    """A fifth of the length is lifted, at the only large bulge: least absolute offsets lean."""
+    u = cases.U6
+    up = np.where((u > 0.4) & (u < 0.62), np.sin(np.pi * (u - 0.4) / 0.22) ** 2, 0.0)
+    wide = np.sin(3.0 * np.pi * u) * np.sin(np.pi * u) ** 2
+    flat = np.column_stack([240.0 * u, 26.0 * wide, 0.0 * u])
+    plane = found(flat + height * np.outer(up, UP), tool)
+    assert plane.rule == "fitted"
+    assert angle(plane.normals[0], UP) < 0.1
+    assert not plane.guessed
+    assert plane.inside > 0.5
+
+
+@pytest.mark.parametrize("tool", [None, UP])
+@pytest.mark.parametrize("heading", [170.0, 180.0, 90.0, -120.0])
+def test_strokes_of_one_plate_share_its_plane_whichever_way_they_run(tool, heading):
+    tilt = cases.about("x", 25.0)
+    strokes = [FLAT @ tilt.T, FLAT @ (tilt @ cases.about("z", heading)).T + [40.0, 9.0, 3.0]]
+    axis = None if tool is None else tilt @ tool
+    planes = stroke_planes(strokes, [axis] * 2, 0.0, False)
+    assert planes.pooled
+    assert planes.apart < 1e-4
+    for normal in planes.normals:
+        assert angle(normal, tilt @ UP) < 1e-5
+
+
 @pytest.mark.parametrize("off", [[0.0, 0, 0], [500.0, 0, 0], [0.0, 300, -200]])
 def test_a_way_there_and_back_tells_no_plane_wherever_it_lies(off):
     back = np.r_[FLAT, FLAT[::-1]] * [1.0, 0.02, 1.0] + off
