@@ -160,7 +160,7 @@ def _feet_sought(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, 
     mesh, shape = charts.mesh, position.shape
     sign = np.repeat(charts.centre.sign, shape[1], axis=0)
     given = position.reshape(-1, 3)
-    foot, face = mesh.search(given)
+    foot, face = mesh.search_without_kernels(given)
     height = np.zeros(len(given))
     left = np.arange(len(given))
     for step in range(_FEET):
@@ -174,7 +174,7 @@ def _feet_sought(charts: MeshCharts, position: Floats) -> tuple[Floats, Floats, 
         if step == _FEET - 1:
             foot[left] = np.nan
             break
-        foot[left], face[left] = mesh.search(below)
+        foot[left], face[left] = mesh.search_without_kernels(below)
     facet = mesh.face_normals[face]
     return foot.reshape(shape), facet.reshape(shape), height.reshape(shape[:2])
 

@@ -281,6 +281,10 @@ class TriangleMesh:
             foot[doubt], face[doubt] = self._facets.search(points[doubt])
         return foot, face
 
+    def search_without_kernels(self, points: Floats) -> tuple[Floats, Integers]:
+        """As `search`; of facets that share a point the one that is named without kernels."""
+        return self._facets.search(points)
+
     def smooth_normals(self, position: Floats, face: Integers) -> Floats:
         """Unit normals at points of faces, interpolated between the corners'.
 
