@@ -2,9 +2,9 @@
 
 Sections: ``lift`` (charts and lift on meshes, one process), ``draw`` (as a part of a batch is
 drawn, two processes, in memory), ``surface`` (`--orientation surface`, on a plane and on a mesh),
-``files`` (`generalize` to Parquet), ``start`` (one stroke, a whole process). Times are of the
-processor but where it says so, so that what else a machine does tells less; each is the median of
-turns A B A B ...
+``files`` (a part to Parquet beside memory), ``start`` (one stroke, a whole process). Times are of
+the processor but where it says so, so that what else a machine does tells less; each is the median
+of turns A B A B ...
 """
 
 import multiprocessing
@@ -20,16 +20,18 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from benchmarks.batches import command, curved_pairs, level_pairs, table_of
+from benchmarks.batches import curved_pairs, level_pairs
 from benchmarks.cluster_demo import BIN
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
+from dmpcli.batch.part import Job, Part, draw_part
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.dmp.generalization import draw_blocks
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.records import file_io
 from dmpcli.records import skill as skill_file
+from dmpcli.records.record import Form, Provenance
 from dmpcli.surfaces.kernels import ready
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
@@ -172,28 +174,23 @@ def processor(words: list[str]) -> float:
 
 
 def files(place: Path) -> None:
-    """Print trajectories per second to Parquet, one process, sustained, by either means."""
-    fitted(place)
-    part, folder = place / "bumpy.ply", place / "batch"
-    mesh = field_mesh(FACES[0])
-    trimesh.Trimesh(mesh.V, mesh.F, process=False).export(part)
-    few, many = 500, 2_500
-    rows = curved_pairs(many)
-    tables = {count: table_of(place, rows[:count], f"curved-{count}") for count in (few, many)}
-    words = ("--surface", part, "--snap-tol", 1, "--on-error", "skip")
-    times: dict[tuple[str, int], list[float]] = {}
-    for _ in range(TURNS):
-        for kernels in ("pure", "compiled"):
-            for count, table in tables.items():
-                line = command(place, table, folder, *words, "--kernels", kernels)
-                times.setdefault((kernels, count), []).append(processor(line))
-    print(f"| `generalize`, {many} pairs less {few}, per CPU second | numpy | kernels |")
-    print("| --- | ---: | ---: |")
-    rates = [
-        (many - few) / (np.median(times[kernels, many]) - np.median(times[kernels, few]))
-        for kernels in ("pure", "compiled")
-    ]
-    print(f"| {FACES[0]} faces, to Parquet | {rates[0]:.0f} | {rates[1]:.0f} |")
+    """Print trajectories per second of a part that is drawn in memory and to Parquet, in turn."""
+    skill, _ = skill_file.decode(file_io.read(fitted(place)))
+    (place / "parts").mkdir(exist_ok=True)
+    mesh, rows, count = field_mesh(FACES[0]), curved_pairs(1000), 1000
+    print("| a part of 1000 pairs, 500 poses, one process, per CPU second | in memory | to Parquet "
+          "| ratio (≥ 0.8) |")  # fmt: skip
+    print("| --- | ---: | ---: | ---: |")
+    for name in ("numpy", "kernels"):
+        task = Task(skill, mesh, GeneralizeOptions(compiled=name == "kernels"))
+        _HELD[:] = [(task, rows)]
+        ends, ids = Pairs(rows[:, :3], rows[:, 3:]), list(map(str, range(count)))
+        part = Part(0, np.arange(count), ids, ends, np.full(count, skill.duration))
+        provenance = Provenance("generalize", {}, (), {})
+        job = Job(task, False, provenance, Form(False, "zstd"), str(place / "parts"))
+        memory, written = in_turn([partial(drawn, 0, 0, count), partial(draw_part, job, part)])
+        rates = f"{count / memory:.0f} | {count / written:.0f} | {memory / written:.2f}"
+        print(f"| {FACES[0]} faces, {name} | {rates} |", flush=True)
 
 
 def start(place: Path) -> None:

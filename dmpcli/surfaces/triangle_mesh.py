@@ -15,7 +15,8 @@ from dmpcli.surfaces.topology import Adjacency, Topology, places
 
 if TYPE_CHECKING:
     from dmpcli.surfaces.kernels.mesh import Compiled
-    from dmpcli.surfaces.kernels.tree import Facets, TreeOrder
+    from dmpcli.surfaces.kernels.tree import Facets
+    from dmpcli.surfaces.kernels.tree_order import TreeOrder
     from dmpcli.surfaces.slits import Slits
 
 _FEW = 8
@@ -105,11 +106,11 @@ class TriangleMesh:
     @cached_property
     def tree_order(self) -> "TreeOrder":
         """Order of the facets in the kernels' search tree, which a store may keep."""
-        from dmpcli.surfaces.kernels import tree
+        from dmpcli.surfaces.kernels.tree_order import TreeOrder
 
         if self._known_order is not None:
-            return tree.TreeOrder(*self._known_order)
-        return tree.TreeOrder.of(self.shape.corners)
+            return TreeOrder(*self._known_order)
+        return TreeOrder.of(self.shape.corners)
 
     _known_order: "tuple[Halves, Halves] | None" = None
 

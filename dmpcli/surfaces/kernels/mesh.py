@@ -6,7 +6,8 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
 from dmpcli.surfaces.kernels import tree
-from dmpcli.surfaces.kernels.tree import Facets, TreeOrder
+from dmpcli.surfaces.kernels.tree import Facets
+from dmpcli.surfaces.kernels.tree_order import TreeOrder, boxes_of
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Compiled:
         )
         tree.fill(reals, numbers, faces, order, self.rows.astype(np.int32))
         self._lying = _on_one_another(mesh.vertices)
-        self.facets = Facets(_outwards(tree.boxes_of(reals, first)), first, reals, numbers)
+        self.facets = Facets(_outwards(boxes_of(reals, first)), first, reals, numbers)
 
     def asked(self) -> Integers:
         """Faces whose shape kernels have asked for and not found."""

@@ -4,12 +4,20 @@ import numpy as np
 
 from dmpcli.spatial import rotations
 from dmpcli.spatial.kernels import euler_of_products
-from dmpcli.surfaces.kernels import checks, facet_walks, samples, smoothing, stepping, tree
+from dmpcli.surfaces.kernels import (
+    checks,
+    facet_walks,
+    samples,
+    smoothing,
+    stepping,
+    tree,
+    tree_order,
+)
 from dmpcli.surfaces.kernels.mesh import Compiled, Geometry
 
 _ENTRIES = (
-    tree.ordered,
-    tree.boxes_of,
+    tree_order.ordered,
+    tree_order.boxes_of,
     tree.fill,
     tree.shape,
     tree.search,
@@ -45,7 +53,7 @@ def load() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     parts, border = np.zeros(2, dtype=np.int64), np.zeros(4, dtype=bool)
     mesh = Geometry(points, faces, corners, n, parts, neighbours, border)
-    known = Compiled(mesh, tree.TreeOrder.of(corners))
+    known = Compiled(mesh, tree_order.TreeOrder.of(corners))
     normals = np.repeat(n[:, None], 3, axis=1)
     known.learn(np.arange(2), normals, np.ones(2), np.ones(2, dtype=bool))
     facets = known.facets
