@@ -214,7 +214,7 @@ def _cancelled(x: Floats) -> bool:
     """Whether the mean path is clearly shorter than any of the paths (n, M, D)."""
     steps = np.diff(np.concatenate([x, pooled_mean(x)[None]]), axis=1)
     *lengths, mean = np.linalg.norm(steps, axis=2).sum(axis=1).tolist()
-    return mean < (1.0 - _CANCELLED) * min(lengths)
+    return bool(mean < (1.0 - _CANCELLED) * min(lengths))
 
 
 def _rms(difference: Floats) -> float:
