@@ -120,7 +120,7 @@ class MeshCharts:
             part = strip_chart.lift(self.mesh, self.centre.rows(smooth), u, v, walked)
             foot[smooth] = part.foot
             e_u = cross(part.across, part.normal)
-            rows = smooth if len(smooth) < len(axes) else slice(None)
+            rows: Integers | slice = smooth if len(smooth) < len(axes) else slice(None)
             for i, column in enumerate((e_u, part.across, part.normal)):
                 axes[rows, :, :, i] = column
             outside[smooth], face[smooth], stretch[smooth] = part.outside, part.face, part.stretch
