@@ -119,7 +119,7 @@ class LocalShape:
         inner : array of bool, shape (k,)
             Those about whose vertices all faces are known.
         """
-        every = np.arange(len(self._whole.F))
+        every = np.arange(len(self._whole.F), dtype=np.int64)
         if self._all:
             return self._whole, every, every, np.ones(len(every), dtype=bool)
         number = np.full(len(every), -1) if self._patch is None else self._patch.number
@@ -127,7 +127,9 @@ class LocalShape:
         rim = np.zeros(len(self._whole.V), dtype=bool)
         rim[self._whole.F[number < 0]] = True
         shape = self._whole if self._patch is None else self._patch.shape
-        return shape, faces, number[faces], ~rim[self._whole.F[faces]].any(axis=1)
+        inner: Booleans = np.logical_not(rim[self._whole.F[faces]].any(axis=1))
+        at: Integers = number[faces]
+        return shape, faces, at, inner
 
     def _grow(self, face: Integers) -> None:
         """Cut out a larger patch, about these faces too."""

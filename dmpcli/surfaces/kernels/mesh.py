@@ -82,7 +82,7 @@ class Compiled:
         rows = self.rows[faces]
         at = self.facets.numbers[rows, tree.VERTICES : tree.VERTICES + 3]
         apart = _split(at, normals, len(self._lying))
-        split = (apart[at] | self._lying[at]).any(axis=1)
+        split: Booleans = np.asarray((apart[at] | self._lying[at]).any(axis=1))
         new = np.flatnonzero(inner & (self.facets.reals[rows, tree.REACH] < 0.0))
         tree.shape(self.facets, rows[new], normals[new], reach[new], split[new])
         self.unknown -= len(new)
