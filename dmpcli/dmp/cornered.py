@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.dmp import corner_blends, corner_pieces, corner_search
 from dmpcli.dmp.corner_pieces import COST, SmoothPiece
 from dmpcli.dmp.corner_search import Candidate
@@ -24,6 +24,10 @@ _ROUNDS = 3
 # Coefficients up to which two pieces are plain, and squares beyond those of noise, in variances,
 # that a polynomial of more leaves where no spline that does better costs as little as they.
 _PLAIN, _FAR = 6.0, 200.0
+# Samples beside a corner that tell of the velocities there, and how often their difference a jump
+# is at most: ends of pieces that follow the noise have jumps of several times as much, and of 248
+# rounded corners that are none, one in fifty has more than 1.12 times.
+_BESIDE, _WILD = 4, 1.5
 
 
 @dataclass(frozen=True)
@@ -94,23 +98,12 @@ def cornered(
     at = pieces.needed(at)
     if len(at) == 0:
         return None
-    meeting, blends = None, np.zeros_like(x)
-    for _ in range(_ROUNDS):
-        # Without what is rounded, corners are where they would be.
-        without = x - blends
-        at = corner_search.located(without, [(float(place), 1.0) for place in at], noise)
-        meeting = _met(without, at, noise, variance, breaks)
-        if meeting is None:
-            return None
-        sharp = meeting.smooth == 1
-        corners, jumps = at[sharp], meeting.jumps[sharp]
-        least = corner_blends.least(len(x), corners, jumps, noise.typical)
-        halves = corner_blends.likely(x - meeting.values, corners, jumps, noise.typical, False)
-        long = halves > least
-        blends = corner_blends.added(len(x), corners[long], jumps[long], halves[long])
-        if not long.any():
-            break
-    assert meeting is not None
+    rounded = _rounded(x, at, noise, variance, breaks)
+    if rounded is None:
+        return None
+    at, meeting, blends = rounded
+    sharp = meeting.smooth == 1
+    corners, jumps = at[sharp], meeting.jumps[sharp]
     residual = x - meeting.values - blends
     cost = float(np.sum(residual**2)) / variance + COST * meeting.size + _places(len(at), x)
     if cost >= smooth or not corner_pieces.explained(residual, noise):
@@ -158,6 +151,46 @@ def _met(x: Floats, at: Floats, noise: Noise, variance: float, breaks: Floats) -
     finest = max(piece.size / len(piece.values) for piece in best)
     rests = (best[0].rests[0], best[-1].rests[1])
     return _Meeting(values, jumps, np.array(smooth), size, finest, rests)
+
+
+def _rounded(
+    x: Floats, at: Floats, noise: Noise, variance: float, breaks: Floats
+) -> tuple[Floats, _Meeting, Floats] | None:
+    """Fit corners and what rounds them in turn: where they are, the pieces, and what blends add."""
+    meeting, wild, blends = None, np.zeros(0, dtype=bool), np.zeros_like(x)
+    for _ in range(_ROUNDS):
+        # Without what is rounded, corners are where they would be.
+        without = x - blends
+        at = corner_search.located(without, [(float(place), 1.0) for place in at], noise)
+        meeting = _met(without, at, noise, variance, breaks)
+        if meeting is None:
+            return None
+        sharp = meeting.smooth == 1
+        corners, jumps = at[sharp], meeting.jumps[sharp]
+        wild = _wild(meeting.values, corners, jumps)
+        if wild.any():
+            at = np.setdiff1d(at, corners[wild])
+            if len(at) == 0:
+                return None
+            continue
+        least = corner_blends.least(len(x), corners, jumps, noise.typical)
+        halves = corner_blends.likely(x - meeting.values, corners, jumps, noise.typical, False)
+        long = halves > least
+        blends = corner_blends.added(len(x), corners[long], jumps[long], halves[long])
+        if not long.any():
+            break
+    return None if meeting is None or wild.any() else (at, meeting, blends)
+
+
+def _wild(values: Floats, corners: Floats, jumps: Floats) -> Booleans:
+    """Which corners (P,) are ends of pieces that follow the noise: what is beside turns less."""
+    before = np.floor(corners).astype(np.int64)
+    after = before + 1
+    first, last = np.maximum(before - _BESIDE, 0), np.minimum(after + _BESIDE, len(values) - 1)
+    coming = (values[before] - values[first]) / np.maximum(before - first, 1)[:, None]
+    going = (values[last] - values[after]) / np.maximum(last - after, 1)[:, None]
+    turn = np.linalg.norm(going - coming, axis=1)
+    return np.asarray(np.linalg.norm(jumps, axis=1) > _WILD * turn)
 
 
 def _dear(found: list[Candidate], x: Floats, noise: Noise, variance: float, smooth: float) -> bool:

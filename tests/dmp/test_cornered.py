@@ -242,3 +242,11 @@ def test_a_short_piece_has_no_more_coefficients_than_samples():
         piece = corner_pieces.between(x, 0.0, high, white, 0.02, np.arange(60.0))
         assert piece is None or piece.size <= len(piece.values)
     assert least_squares.DEGREE == 5
+
+
+@pytest.mark.parametrize(("seconds", "sigma", "seed"), [(0.15, 0.5, 9506), (0.1, 0.5, 9517)])
+def test_a_corner_whose_pieces_follow_the_noise_is_none(seconds, sigma, seed):
+    t, truth, peak = blended(seed, seconds)
+    points = noisy(truth, sigma, seed)
+    spline = smooth(points, float(t[-1]), noise.estimate(points))
+    assert np.max(np.linalg.norm(spline(t, 2), axis=1)) < 5.0 * peak
