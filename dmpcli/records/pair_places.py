@@ -4,17 +4,23 @@ The words of the table are kept as they stand; `workflows` makes files of them.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from dmpcli.arrays import Booleans, Integers
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.records.layouts import LENGTH
 from dmpcli.records.schemas import OK
 from dmpcli.records.tables import Table, is_text
 
 COLUMNS = ("surface", "surface_unit", "pose", "in", "offset")
+
+POSE_CELLS = tuple(f"pose[{i}]" for i in range(6))
+"""What a column of lists becomes that holds a pose in each row, see `list_columns`."""
+
+_BRACKETS = "[]()"
 
 AXES = ("base", "part")
 """In whose axes a pair is given: the robot's base, or the surface's own."""
@@ -77,6 +83,8 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
         Of each row; what is wrong with a place is written into it.
     """
     present = [name for name in COLUMNS if name in table.columns]
+    if "pose" not in present and all(name in table.columns for name in POSE_CELLS):
+        present = [name for name in COLUMNS if name in (*present, "pose")]
     if not present:
         return None
     codes, words = [], []
@@ -93,7 +101,7 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
         said = dict(
             zip(COLUMNS, (w[c] for w, c in zip(words, stacked[row], strict=True)), strict=True)
         )
-        place, odd = _place(said)
+        place, odd = _place(said, table.decimal)
         places.append(place)
         if odd is not None:
             column, what = odd
@@ -103,14 +111,45 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
 
 def _coded(table: Table, name: str) -> tuple[Integers, list[str]]:
     """Number of each row's word, shape (rows,), and the words, without blanks about them."""
-    values = table.columns[name]
-    if isinstance(values, np.ndarray) or not is_text(values.type):
-        values = pa.array(table.texts(name))
+    if name not in table.columns:
+        values = pa.array([_words(row) for row in np.stack(_pose_cells(table), axis=1).tolist()])
+    else:
+        values = table.columns[name]
+        if isinstance(values, np.ndarray) or not is_text(values.type):
+            values = pa.array([_word(value) for value in values.tolist()])
     words = pc.utf8_trim_whitespace(values.fill_null("")).dictionary_encode()
     return np.asarray(words.indices).astype(np.int64), words.dictionary.to_pylist()
 
 
-def _place(said: dict[str, str]) -> tuple[Place, tuple[str, str] | None]:
+def _pose_cells(table: Table) -> list[Floats]:
+    return [table.floats(name) for name in POSE_CELLS]
+
+
+def _word(value: Any) -> str:
+    """Return the cell of a column that is not of text as text; NaN is an empty one, as null is."""
+    if value is None or value != value:
+        return ""
+    return _words(value) if isinstance(value, list) else str(value)
+
+
+def _words(values: list[Any]) -> str:
+    return " ".join(map(str, values))
+
+
+def _pose(said: str) -> str:
+    """Return six numbers as a command line has them, however a table parts them.
+
+    Lists written as text come with brackets and commas; where blanks part the numbers, a comma in
+    one of them is a decimal sign. What is not six numbers stays as it is: the name of a file.
+    """
+    bare = said.strip(_BRACKETS)
+    for words in (bare.split(), bare.split(","), bare.replace(",", ".").split()):
+        if len(words) == 6 and all(_number(word) is not None for word in words):
+            return " ".join(word.strip() for word in words)
+    return said
+
+
+def _place(said: dict[str, str], decimal: str) -> tuple[Place, tuple[str, str] | None]:
     """Return a place, and which of its words is none and why."""
     odd: tuple[str, str] | None = None
     if said["surface_unit"] not in ("", *LENGTH):
@@ -119,11 +158,11 @@ def _place(said: dict[str, str]) -> tuple[Place, tuple[str, str] | None]:
         odd = odd or ("in", f"is neither {' nor '.join(AXES)}")
     offset = None
     if said["offset"]:
-        offset = _number(said["offset"])
+        offset = _number(said["offset"].replace(decimal, "."))
         if offset is None or not abs(offset) <= FARTHEST_OFFSET:
             odd = odd or ("offset", f"is no number of mm up to {FARTHEST_OFFSET:g}")
             offset = None
-    place = Place(said["surface"], said["surface_unit"], said["pose"], said["in"], offset)
+    place = Place(said["surface"], said["surface_unit"], _pose(said["pose"]), said["in"], offset)
     return place, odd
 
 

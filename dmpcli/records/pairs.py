@@ -30,6 +30,8 @@ LARGEST_ANGLE = 1e3
 KNOWN = ("id", *START, *GOAL, *START_ANGLES, *GOAL_ANGLES, "duration", *pair_places.COLUMNS)
 """Columns that are read."""
 
+_NUMBERS = (*START, *GOAL, *START_ANGLES, *GOAL_ANGLES, "duration", "offset")
+
 
 @dataclass(frozen=True)
 class PairTable:
@@ -52,6 +54,8 @@ class PairTable:
         Where the table itself says on which surface each pair lies.
     unknown : list of str
         Columns that nobody reads.
+    remarks : tuple of str
+        What a person should know of how it was read.
     rows : array of int, shape (B,), optional
         Which rows of the whole table these are, counted from 0 and rising, where they are not all.
     """
@@ -65,6 +69,7 @@ class PairTable:
     places: PairPlaces | None = None
     unknown: list[str] = field(default_factory=list)
     rows: Integers | None = None
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -111,6 +116,7 @@ def decoded(table: Table) -> PairTable:
     InputError
         As `read`.
     """
+    table = tables.with_decimal_commas(tables.without_blank_rows(table), _NUMBERS)
     status = [OK] * len(table)
     start, goal = _three(table, START, status), _three(table, GOAL, status)
     duration = np.full(len(table), np.nan)
@@ -119,7 +125,7 @@ def decoded(table: Table) -> PairTable:
         bad = ~table.empty("duration") & ~(np.isfinite(duration) & (duration > 0))
         _mark(table, status, bad, "duration", "is not a positive time in s")
     # A table of pairs that a batch ended with has more of its own, which mean no harm here.
-    known = (*KNOWN, *schemas.PAIRS.columns)
+    known = (*KNOWN, *schemas.PAIRS.columns, *pair_places.POSE_CELLS)
     return PairTable(
         table.name,
         _ids(table),
@@ -135,6 +141,7 @@ def decoded(table: Table) -> PairTable:
         pair_places.read(table, status),
         [name for name in table.columns if name not in known],
         table.rows,
+        table.remarks,
     )
 
 
@@ -186,6 +193,11 @@ def _ids(table: Table) -> list[str]:
         return ids
     seen: dict[str, int] = {}
     for row, name in enumerate(ids):
+        if name in seen and not name:
+            raise InputError(
+                f"{table.name}: column 'id', {table.at(row)}: is empty, and so is "
+                f"{table.at(seen[name])}; give each pair an id, or leave the column out"
+            )
         if name in seen:
             raise InputError(
                 f"{table.name}: column 'id', {table.at(row)}: {name!r} is also in "

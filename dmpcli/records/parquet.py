@@ -208,6 +208,8 @@ def _width(kind: Any) -> int:
     """Bytes of memory that a value takes at most; what is nested is not read."""
     if _is_text(kind) or pa.types.is_dictionary(kind):
         return _TEXT
+    if pa.types.is_null(kind):  # a column without any value, as pandas writes one
+        return _NUMBER
     return 0 if _nested(kind) else max(kind.bit_width // 8, _NUMBER)
 
 
@@ -231,26 +233,50 @@ def twice(names: Sequence[str]) -> str | None:
     return None
 
 
+_TEXTS = (pa.string(), pa.large_string(), pa.string_view())
+_BYTES = (pa.binary(), pa.large_binary(), pa.binary_view())
+
+
 def _is_text(kind: Any) -> bool:
-    return bool(
-        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_binary(kind)
-    )
+    """Tell text, and bytes, as which many writers keep it."""
+    return kind in _TEXTS or kind in _BYTES
+
+
+def plain_text(column: Any) -> Any:
+    """Return a column of text, in whichever type its writer keeps it, as plain text.
+
+    Parameters
+    ----------
+    column : Arrow array, chunked or not
+        Bytes that are no text in UTF-8 stay as they are, and so does what is neither.
+    """
+    kind = column.type
+    if pa.types.is_dictionary(kind) and _is_text(kind.value_type):
+        column = column.cast(kind.value_type)
+        kind = column.type
+    if kind not in (pa.string_view(), *_BYTES):
+        return column
+    try:
+        return column.cast(pa.large_string() if kind == pa.large_binary() else pa.string())
+    except pa.ArrowInvalid:
+        return column
 
 
 def _plain(source: Source, found: Any) -> Any:
-    """Return a table whose dictionaries are plain columns, if they are not too large for that."""
+    """Return a table whose text is plain, if its dictionaries are not too large for that."""
     import pyarrow.compute as pc
 
     for i, field in enumerate(found.schema):
         kind = field.type
-        if not pa.types.is_dictionary(kind) or not _is_text(kind.value_type):
-            continue
         column = found.column(i)
-        taken = 0
-        for chunk in column.chunks:
-            lengths = pc.binary_length(chunk.dictionary)
-            taken += pc.sum(lengths.take(chunk.indices)).as_py() or 0
-        untrusted.judge_table(source.name, taken, len(source.content))
-        plain = field.with_type(kind.value_type)
-        found = found.set_column(i, plain, column.cast(kind.value_type))
+        if pa.types.is_dictionary(kind) and _is_text(kind.value_type):
+            taken = 0
+            for chunk in column.chunks:
+                lengths = pc.binary_length(chunk.dictionary)
+                taken += pc.sum(lengths.take(chunk.indices)).as_py() or 0
+            untrusted.judge_table(source.name, taken, len(source.content))
+        elif not _is_text(kind):
+            continue
+        plain = plain_text(column)
+        found = found.set_column(i, field.with_type(plain.type), plain)
     return found

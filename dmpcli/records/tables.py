@@ -7,7 +7,7 @@ their bytes, and a bad cell can still be shown as it stands in the file.
 import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -136,7 +136,10 @@ class Table:
 
             blank = pc.equal(pc.utf8_trim_whitespace(values), "")
             return np.array([value is not False for value in blank.to_pylist()], dtype=bool)
-        return np.isnan(_floats(values))
+        # What is no number, such as a span of time, is not nothing for that.
+        if pa.types.is_floating(values.type):
+            return np.isnan(_floats(values))
+        return np.array(values.is_null().to_pylist(), dtype=bool)
 
     def shown(self, column: str, row: int) -> str:
         """Return a cell as a message shows it."""
@@ -235,7 +238,8 @@ def of_arrow(name: str, table: Any, rows: Integers | None = None) -> Table:
     """
     columns: dict[str, Any] = {}
     for column in table.column_names:
-        columns |= list_columns.expanded(column, table.column(column).combine_chunks())
+        values = parquet.plain_text(table.column(column)).combine_chunks()
+        columns |= list_columns.expanded(column, values)
     return Table(name, columns, rows=rows)
 
 
@@ -278,6 +282,63 @@ def _csv(
         found = body_columns(body, names, separator, source.name)
     rows = len(next(iter(found.values()), ()))
     return Table(source.name, found, body.numbers[:rows], decimal, tuple(remarks))
+
+
+def with_decimal_commas(table: Table, names: Collection[str]) -> Table:
+    """Return a table with the decimal sign that its columns of numbers have.
+
+    It is the comma where one of them has some between digits and none has a point; that is
+    remarked. What columns of text hold, such as names of files, says nothing.
+
+    Parameters
+    ----------
+    table : Table
+    names : collection of str
+        Of columns of numbers; those that the table lacks are passed over.
+    """
+    import pyarrow.compute as pc
+
+    cells = [table.columns[name] for name in names if name in table.columns]
+    cells = [one for one in cells if _is_text_array(one)]
+
+    def some(pattern: str) -> bool:
+        return any(pc.any(pc.match_substring_regex(one, pattern)).as_py() for one in cells)
+
+    if table.decimal == "," or not some(r"[0-9],[0-9]") or some(r"[0-9]\.[0-9]"):
+        return table
+    remark = "commas between digits read as decimal signs"
+    return replace(table, decimal=",", remarks=(*table.remarks, remark))
+
+
+def without_blank_rows(table: Table) -> Table:
+    """Return a text table without rows of which no cell holds anything.
+
+    Spreadsheets write such rows below their last one. Of a piece of a file, whose rows have numbers
+    there, all stay.
+    """
+    import pyarrow.compute as pc
+
+    columns = table.columns
+    if table.lines is None or table.rows is not None:
+        return table
+    if not all(map(_is_text_array, columns.values())):
+        return table
+    blank = np.ones(len(table), dtype=bool)
+    for values in columns.values():
+        here = np.flatnonzero(blank)
+        if not len(here):
+            return table
+        cells = pc.utf8_trim_whitespace(values.take(pa.array(here)))
+        blank[here] = np.array(pc.equal(cells, "").to_pylist(), dtype=bool)
+    kept = np.flatnonzero(~blank)
+    if len(kept) in (0, len(table)):
+        return table
+    some = {name: values.take(pa.array(kept)) for name, values in columns.items()}
+    return replace(table, columns=some, lines=table.lines[kept])
+
+
+def _is_text_array(values: Any) -> bool:
+    return not isinstance(values, np.ndarray) and is_text(values.type)
 
 
 def _number_columns(

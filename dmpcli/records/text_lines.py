@@ -118,7 +118,8 @@ def counted_lines(source: Source) -> TextLines:
             content.decode("utf-8")
         except UnicodeDecodeError:
             raise InputError(
-                f"{source.name}: is neither a Parquet file nor text in UTF-8"
+                f"{source.name}: is neither a Parquet file nor text in UTF-8; save it as one of "
+                "them (in a spreadsheet: CSV UTF-8)"
             ) from None
     if b"\r" in content:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")

@@ -223,7 +223,9 @@ def _workers(wanted: BatchOptions) -> Iterator[Draw]:
 
 
 def tell_of_unknown(table: PairTable) -> None:
-    """Say once which columns of a table nobody reads."""
+    """Say once how a table was read, and which of its columns nobody reads."""
+    for remark in table.remarks:
+        tell(f"{table.name}: {remark}")
     if table.unknown:
         tell(
             f"{table.name}: {', '.join(map(repr, table.unknown))}: no such column is known, and "

@@ -4,6 +4,7 @@ What the words of the table can tell is checked before anything is drawn; a surf
 where its pairs are drawn, and what stands against it, or against pairs on it, is told by row.
 """
 
+import contextlib
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -211,10 +212,26 @@ def _file(name: str, folder: Location) -> SiteFile:
     """
     path = beside(folder, name).absolute()
     if not path.exists():
-        raise InputError(f"{name}: no such file; names are relative to the table's folder")
+        meant = _meant(name, folder)
+        raise InputError(
+            f"{name}: no such file; "
+            + (f"did you mean {meant}?" if meant else "names are relative to the table's folder")
+        )
     if not path.is_file() or (isinstance(path, Path) and not os.access(path, os.R_OK)):
         raise InputError(f"{name}: is no file that can be read")
     return SiteFile(str(path), name)
+
+
+def _meant(name: str, folder: Location) -> str | None:
+    """Return a file of this machine that has the name but for slashes and capitals."""
+    if not isinstance(folder, Path):
+        return None
+    plain = Path(name.replace("\\", "/"))
+    with contextlib.suppress(OSError):
+        for one in sorted((folder / plain).parent.iterdir()):
+            if one.name.casefold() == plain.name.casefold():
+                return str(plain.with_name(one.name))
+    return None
 
 
 def _mark(table: PairTable, places: PairPlaces, i: int, why: str) -> None:

@@ -1,11 +1,17 @@
 """Tables say where each pair lies; what is wrong with a word is told by row."""
 
+import io
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
+from dmpcli.errors import InputError
 from dmpcli.records import pairs
 from dmpcli.records.file_io import Source
 from dmpcli.records.pair_places import Place
+from dmpcli.records.pair_stream import PairStream
 
 HEADER = "x0,y0,z0,xg,yg,zg"
 
@@ -55,17 +61,131 @@ def test_a_word_that_is_none_is_told_by_its_line(row, what):
 
 
 def test_numbers_of_parquet_tables_are_words_too():
-    import io
-
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     columns = {name: [1.0, 2.0] for name in HEADER.split(",")}
     sink = io.BytesIO()
     pq.write_table(pa.table(columns | {"surface": ["a", None], "offset": [1.5, None]}), sink)
     found = pairs.read(Source("p.parquet", sink.getvalue()))
     assert [place.surface for place in found.places.places] == ["a", ""]
     assert [place.offset for place in found.places.places] == [1.5, None]
+
+
+def parquet(**columns):
+    sink = io.BytesIO()
+    numbers = {name: pa.array([1.0, 2.0]) for name in HEADER.split(",")}
+    pq.write_table(pa.table(numbers | columns), sink)
+    return sink.getvalue()
+
+
+def both_ways(content, tmp_path):
+    """Read as a whole, and in pieces, as a table of many rows is."""
+    path = tmp_path / "p.parquet"
+    path.write_bytes(content)
+    stream = PairStream(path, "", 2, True)
+    return [pairs.read(Source("p.parquet", content)), next(stream.pieces(10))]
+
+
+TEXTS = [
+    pa.string(),
+    pa.large_string(),
+    pa.string_view(),
+    pa.binary(),
+    pa.large_binary(),
+    pa.binary_view(),
+    pa.dictionary(pa.int8(), pa.string()),
+    pa.dictionary(pa.int32(), pa.large_string()),
+]
+
+
+@pytest.mark.parametrize("kind", TEXTS, ids=str)
+def test_text_is_text_in_whichever_type_its_writer_keeps_it(kind, tmp_path):
+    names = pa.array(["ä.stl", None])
+    dictionary = pa.types.is_dictionary(kind)
+    column = (names.cast(kind.value_type).dictionary_encode() if dictionary else names).cast(kind)
+    ids = pa.array(["u", "v"]).cast(pa.string() if dictionary else kind)
+    for found in both_ways(parquet(id=ids, surface=column), tmp_path):
+        assert found.ids == ["u", "v"]
+        assert [place.surface for place in found.places.places] == ["ä.stl", ""]
+
+
+def test_a_column_without_any_value_says_nothing(tmp_path):
+    nothing = dict.fromkeys(("surface", "pose", "in", "offset", "duration"), pa.nulls(2))
+    for found in both_ways(parquet(**nothing), tmp_path):
+        assert found.places.places == [Place()]
+        assert found.good.all()
+
+
+def test_an_offset_that_is_nan_is_none_as_null_is(tmp_path):
+    for found in both_ways(parquet(offset=pa.array([float("nan"), 2.5])), tmp_path):
+        assert [place.offset for place in found.places.places] == [None, 2.5]
+        assert found.good.all()
+
+
+@pytest.mark.parametrize("column", [pa.array([None, 8], pa.duration("s")), pa.array([None, [8]])])
+def test_a_duration_that_is_no_number_is_told_not_passed_over(column, tmp_path):
+    for found in both_ways(parquet(duration=column), tmp_path):
+        assert found.good.tolist() == [True, False]
+        assert found.status[1].endswith("is not a positive time in s")
+
+
+@pytest.mark.parametrize("first", [None, [0.0, 0, 0, 0, 0, 0]])
+@pytest.mark.parametrize("kind", [pa.list_(pa.float64()), pa.list_(pa.float32(), 6)])
+def test_poses_may_be_lists_of_numbers(first, kind, tmp_path):
+    column = pa.array([first, [500.5, 0, 20, 0, 0, 0.25]], kind)
+    for found in both_ways(parquet(pose=column), tmp_path):
+        poses = [[float(word) for word in place.pose.split()] for place in found.places.places]
+        assert poses == [first or [], [500.5, 0, 20, 0, 0, 0.25]]
+        assert found.unknown == []
+
+
+@pytest.mark.parametrize(
+    ("said", "pose"),
+    [
+        ("[500.5, 0, 20, 0, 0, 0.1]", "500.5 0 20 0 0 0.1"),
+        ("(500.5,0,20,0,0,0.1)", "500.5 0 20 0 0 0.1"),
+        ("[500.5  0.  20.  0.  0.  0.1]", "500.5 0. 20. 0. 0. 0.1"),
+        ("500,5 0 20 0 0 0,1", "500.5 0 20 0 0 0.1"),
+        ("500,5 0 20 0 0", "500,5 0 20 0 0"),
+        ("poses/1,2,3,4,5,6.json", "poses/1,2,3,4,5,6.json"),
+    ],
+)
+def test_a_pose_is_six_numbers_however_a_table_parts_them(said, pose):
+    found = table(f'"{said}"', more="pose")
+    assert [place.pose for place in found.places.places] == [pose]
+
+
+def test_decimal_commas_are_those_of_the_numbers_whatever_names_hold():
+    text = (
+        "\ufeffid;x0;y0;z0;xg;yg;zg;surface;offset;duration\r\n"
+        "a;-40;0;5,25;40;0;5,5;v2.1.stl;2,5;8,5\r\n"
+        "b;-40;0;5;40;0;1e-1;v2.2.stl;;\r\n"
+    )
+    found = pairs.read(Source("pairs.csv", text.encode()))
+    np.testing.assert_array_equal(found.pairs.start[:, 2], [5.25, 5.0])
+    np.testing.assert_array_equal(found.pairs.goal[:, 2], [5.5, 0.1])
+    np.testing.assert_array_equal(found.duration, [8.5, np.nan])
+    assert [place.offset for place in found.places.places] == [2.5, None]
+    assert [place.surface for place in found.places.places] == ["v2.1.stl", "v2.2.stl"]
+    assert found.good.all()
+    assert found.remarks == ("commas between digits read as decimal signs",)
+
+
+def test_points_and_commas_together_are_not_guessed_at():
+    text = "x0;y0;z0;xg;yg;zg\n1,5;2;3;4;5;6\n1.5;2;3;4;5;6\n"
+    found = pairs.read(Source("pairs.csv", text.encode()))
+    assert found.good.tolist() == [False, True]
+    assert found.remarks == ()
+
+
+def test_rows_without_a_word_are_no_rows():
+    text = f"id,{HEADER},surface\na,1,2,3,4,5,6,a.stl\n,,,,,,,\nb,1,2,3,4,5,x,a.stl\n, ,,,,,,\n"
+    found = pairs.read(Source("pairs.csv", text.encode()))
+    assert found.ids == ["a", "b"]
+    assert found.status[1].startswith("line 4, column 'zg'")
+
+
+def test_ids_that_are_empty_are_told_as_such():
+    with pytest.raises(InputError, match="line 3: is empty, and so is line 2; give each pair an"):
+        table("", "", more="id")
 
 
 def test_columns_that_nobody_reads_are_known_but_not_those_of_our_own_tables():
