@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from dmpcli.arrays import AnyArray, Integers
+from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.records import file_io, surface
 from dmpcli.records.exact_surface import Exact
 from dmpcli.records.file_io import Source
@@ -189,6 +190,8 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
         pieces = held.get("components")
         components = np.zeros(len(F), dtype=np.int64) if pieces is None else _whole(pieces)
         adjacency = Adjacency(_whole(held["neighbours"]), components)
+        if not _sound(V, F, adjacency, held):
+            return None
         remarks = json.loads(held["remarks"].tobytes())
         mesh = Mesh(V, F, adjacency)
         if "order" in held:
@@ -196,6 +199,34 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
     except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
         return None
     return MeshFile(V, F, remarks, adjacency), mesh
+
+
+def _sound(V: Floats, F: Integers, adjacency: Adjacency, held: Mapping[str, AnyArray]) -> bool:
+    """Whether all numbers of an entry are of something: kernels look nothing up twice."""
+    count, shape = len(F), (len(F), 3)
+    near = adjacency.neighbours
+    sound = (
+        V.shape == (len(V), 3)
+        and F.shape == near.shape == shape
+        and adjacency.components.shape == (count,)
+        and count > 0
+        and bool(np.isfinite(V).all())
+        and F.min() >= 0
+        and F.max() < len(V)
+        and near.min() >= -1
+        and near.max() < count
+    )
+    if not sound or "order" not in held:
+        return sound
+    order, first = held["order"], held["first"]
+    leaves = len(first) - 1
+    return (
+        np.array_equal(np.sort(order), np.arange(count))
+        and 0 < leaves <= 2 * count
+        and leaves & (leaves - 1) == 0
+        and bool((np.diff(first) >= 0).all())
+        and (first[0], first[-1]) == (0, count)
+    )
 
 
 def _whole(values: AnyArray) -> Integers:

@@ -71,8 +71,8 @@ def reason(
     if verdict.deep[i]:
         return (
             f"the stroke would go {verdict.depth[i]:.2f} mm into the surface, since it was taught "
-            "on another one; name that one with fit --surface, allow the depth with --contact, or "
-            "lift the stroke with --offset"
+            "on another one, or on one that lay elsewhere; name it with fit --surface and "
+            "--surface-pose, allow the depth with --contact, or lift the stroke with --offset"
         )
     if skill.closed:
         return (

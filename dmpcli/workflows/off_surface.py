@@ -79,7 +79,10 @@ def _hint(at: "Floats", read: "SurfaceInput", in_part: bool) -> str | None:
     best = found[0]
     if best.kind == "part":
         unit = next(u for u, scale in others.items() if scale == best.scale)
-        return f"with the part in {unit} they lie on it: give --surface-unit {unit}?"
+        return (
+            f"with the part in {unit} they lie on it: give --surface-unit {unit}, or surface_unit "
+            "in a table of pairs?"
+        )
     return {
         "points in m": "times 1000 they lie on it: are they in m? Lengths are in mm",
         "other frame": "as points of the base they lie on it: leave --in part out?"

@@ -133,9 +133,17 @@ def read(
 
 
 def store_in(folder: Path | None, kernels: bool = False) -> "MeshStore":
-    """Return what reads surfaces, and keeps prepared meshes, for kernels or not, in a folder."""
+    """Return what reads surfaces, and keeps prepared meshes, for kernels or not, in a folder.
+
+    Raises
+    ------
+    InputError
+        There is something else of the folder's name.
+    """
     from dmpcli.records.mesh_store import MeshStore
 
+    if folder is not None and folder.exists() and not folder.is_dir():
+        raise InputError(f"--surface-cache: {folder} is no folder; name one, or leave it out")
     return MeshStore(None if folder is None else str(folder.absolute()), kernels=kernels)
 
 

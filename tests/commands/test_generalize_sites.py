@@ -281,6 +281,8 @@ def test_options_of_surfaces_say_something(shop, tmp_path):
         dmpcli(*words, *part, "--surface-cache", tmp_path / "kept")
         assert content(tmp_path / "b") == plain
     assert len(list((tmp_path / "kept").iterdir())) == 1
+    told = dmpcli(*words, *part, "--surface-cache", flat, code=2).stderr
+    assert "flat.csv is no folder; name one, or leave it out" in told
 
 
 @pytest.mark.thorough

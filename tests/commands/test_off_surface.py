@@ -95,7 +95,7 @@ def test_a_slip_of_unit_or_frame_is_hinted_at(lab, args, hint):
 def test_a_part_in_metres_is_hinted_at(lab):
     done = drawn(*ends(IN_BASE), "--surface", "metres.obj", *POSE)
     assert done.exit_code == 2
-    assert "with the part in m they lie on it: give --surface-unit m?" in done.stderr
+    assert "with the part in m they lie on it: give --surface-unit m, or" in done.stderr
 
 
 def test_a_point_that_no_slip_explains_gets_no_hint(lab):

@@ -104,6 +104,48 @@ def test_a_damaged_entry_is_as_good_as_none_and_mended(tmp_path, damage):
     assert entry.read_bytes() == whole
 
 
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("F", 10_000), ("F", -1), ("neighbours", 10_000), ("neighbours", -2), ("V", np.nan)],
+)
+def test_an_entry_with_numbers_of_nothing_is_as_good_as_none(tmp_path, name, number):
+    part = source(tmp_path / "part.stl")
+    store = MeshStore(str(tmp_path / "kept"))
+    plain = store.load(part)
+    [entry] = (tmp_path / "kept").iterdir()
+    with np.load(entry) as packed:
+        held = dict(packed)
+    held[name][3, 1] = number
+    with entry.open("wb") as stream:
+        np.savez(stream, **held)
+    same(plain, store.load(part))
+
+
+@pytest.mark.parametrize(
+    "first",
+    [[0, 5, 3, 20, 800], [0, 200, 400, 800], [1, 200, 400, 600, 800], [0, 200, 400, 600, 801]],
+)
+def test_an_order_of_the_search_tree_that_is_none_is_not_taken(tmp_path, first):
+    part = source(tmp_path / "part.stl")
+    store = MeshStore(str(tmp_path / "kept"))
+    plain = store.load(part)
+    [entry] = (tmp_path / "kept").iterdir()
+    with np.load(entry) as packed:
+        held = dict(packed)
+    order = np.arange(800, dtype=np.int32)
+    for one, way in ((order, first), (np.zeros_like(order), [0, 200, 400, 600, 800])):
+        with entry.open("wb") as stream:
+            np.savez(stream, **held, order=one, first=np.array(way, dtype=np.int32))
+        again = store.load(part)
+        same(plain, again)
+        assert not again[1].knows_order
+    with entry.open("wb") as stream:
+        np.savez(
+            stream, **held, order=order, first=np.array([0, 200, 400, 600, 800], dtype=np.int32)
+        )
+    assert store.load(part)[1].knows_order
+
+
 def test_the_folder_is_bounded_and_what_was_used_last_stays(tmp_path):
     parts = [source(tmp_path / f"{n}.stl", n=n) for n in range(18, 24)]
     one = MeshStore(str(tmp_path / "one"))

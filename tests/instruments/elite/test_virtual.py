@@ -1,6 +1,7 @@
 """The drivers against the virtual controller: another reading of the same document."""
 
 import re
+import threading
 import time
 from dataclasses import replace
 
@@ -251,7 +252,24 @@ def test_outputs_are_switched_on_the_way_and_off_at_its_end(bench):
 
 @pytest.mark.slow
 def test_an_output_that_is_on_goes_off_with_an_emergency_stop(bench):
-    made = bench("estop@0.6")
-    loop, _ = made.loop(events=(OutputEvent(0.05, "DO1", on=True),))
-    assert isinstance(loop.run(Interruption()).failure, RefusedError)
+    made = bench()
+    loop, _ = made.loop(duration=2.0, events=(OutputEvent(0.05, "DO1", on=True),))
+    seen, running = [], threading.Event()
+    running.set()
+
+    def press():
+        while not seen and running.is_set():
+            with made.lab.lock:
+                if made.lab.controller.outputs.get(1):
+                    seen.append(True)
+                    made.lab.controller.press_estop()
+            time.sleep(0.005)
+
+    hand = threading.Thread(target=press)
+    hand.start()
+    outcome = loop.run(Interruption())
+    running.clear()
+    hand.join()
+    assert seen
+    assert isinstance(outcome.failure, RefusedError)
     assert made.lab.controller.outputs == {1: 0}
