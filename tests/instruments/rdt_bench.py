@@ -3,12 +3,13 @@
 import contextlib
 import socket
 import time
+from unittest import mock
 
 import numpy as np
 
 from dmpcli.instruments.address import Address
 from dmpcli.instruments.clock import MonotonicClock
-from dmpcli.instruments.netft import make
+from dmpcli.instruments.netft import make, stream
 from dmpcli.simulation.netft_server.box import RdtBox
 from dmpcli.simulation.netft_server.faults import BoxFaults
 from dmpcli.simulation.netft_server.settings import BoxSettings
@@ -36,16 +37,19 @@ def running_box(read=lambda t: WRENCH, faults=None, **settings):
 
 
 @contextlib.contextmanager
-def sensor_at(box, **options):
+def sensor_at(box, patience=3.0, **options):
+    """Make a sensor that listens to a box; box and sensor share a process, which may be held up."""
+    patience = stream.SILENCE if np.isfinite(box.faults.silent_after) else patience
     ports = {"http": str(box.http_port), "tcp": str(box.tcp_port)} if box.settings.pages else {}
     # These boxes read one and the same wrench, unless a test says another.
     given = {"frozen": "0", **ports, **options}
     address = Address("sensor", "netft", "127.0.0.1", box.rdt_port, given)
     sensor = make(address, MonotonicClock())
-    try:
-        yield sensor
-    finally:
-        sensor.close()
+    with mock.patch.object(stream, "SILENCE", patience):
+        try:
+            yield sensor
+        finally:
+            sensor.close()
 
 
 def polled(sensor, count):

@@ -286,7 +286,7 @@ def test_a_latched_monitor_condition_is_a_warning(box):
 
 
 def test_a_stalled_sensor_is_a_fault(box):
-    with sensor_at(box) as sensor:
+    with sensor_at(box, patience=stream.SILENCE) as sensor:
         sensor.open()
         sensor.start(100.0)
         polled(sensor, 1)
