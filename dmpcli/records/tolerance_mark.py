@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from dmpcli.dmp.options import LARGEST
 from dmpcli.errors import beside
 
 if TYPE_CHECKING:
@@ -53,6 +52,8 @@ def strays(mark: Mapping[str, float], else_: str, also: str = "") -> str:
     also : str, optional
         What is beyond it beside the path.
     """
+    from dmpcli.dmp.options import LARGEST  # few skills are beyond: execute starts without
+
     rms, largest, tolerance = mark["rms"], mark["largest"], mark["tolerance"]
     anywhere = LARGEST * tolerance
     if rms <= tolerance and largest <= anywhere:
