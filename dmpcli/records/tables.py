@@ -289,6 +289,7 @@ def with_decimal_commas(table: Table, names: Collection[str]) -> Table:
 
     It is the comma where one of them has some between digits and none has a point; that is
     remarked. What columns of text hold, such as names of files, says nothing.
+    A piece of a file cannot tell: the others may have points, and all are to be read alike.
 
     Parameters
     ----------
@@ -298,6 +299,8 @@ def with_decimal_commas(table: Table, names: Collection[str]) -> Table:
     """
     import pyarrow.compute as pc
 
+    if table.rows is not None:
+        return table
     cells = [table.columns[name] for name in names if name in table.columns]
     cells = [one for one in cells if _is_text_array(one)]
 

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dmpcli.errors import InputError
-from dmpcli.records import pairs
+from dmpcli.records import pairs, tables
 from dmpcli.records.file_io import Source
 from dmpcli.records.pair_places import Place
 from dmpcli.records.pair_stream import PairStream
@@ -192,3 +192,11 @@ def test_columns_that_nobody_reads_are_known_but_not_those_of_our_own_tables():
     found = table("red,ok,part-00000.parquet,0.5", more="colour,status,part,nx")
     assert found.unknown == ["colour"]
     np.testing.assert_array_equal(found.pairs.start, [[1, 2, 3]])
+
+
+def test_a_piece_of_a_file_does_not_decide_what_its_commas_are():
+    cells = {name: pa.array(["1,5", "2,5"]) for name in ("x0", "y0", "z0", "xg", "yg", "zg")}
+    whole = tables.Table("t.csv", cells, lines=np.array([2, 3]))
+    piece = tables.Table("t.csv", cells, lines=np.array([2, 3]), rows=np.array([0, 1]))
+    assert pairs.decoded(whole).pairs.start[0, 0] == 1.5
+    assert all("x0" in status for status in pairs.decoded(piece).status)
