@@ -184,4 +184,18 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # By default Python ends without cleaning up; half-written files would stay.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    sys.unraisablehook = _send_again
     app()
+
+
+def _send_again(ignored: Any) -> None:
+    """Send a signal once more that came as an object was cleared away: Python ignores it there."""
+    if not isinstance(ignored.exc_value, SystemExit | KeyboardInterrupt):
+        sys.__unraisablehook__(ignored)
+        return
+    from threading import Timer
+
+    asked = isinstance(ignored.exc_value, KeyboardInterrupt)
+    later = Timer(0.05, os.kill, (os.getpid(), signal.SIGINT if asked else signal.SIGTERM))
+    later.daemon = True
+    later.start()

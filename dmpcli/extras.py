@@ -6,6 +6,7 @@ same packages.
 """
 
 import importlib
+import os
 import platform
 import sys
 from dataclasses import dataclass
@@ -157,3 +158,8 @@ def _where(extra: Extra) -> str:
         return "every Python"
     machines = ", ".join(_MACHINES[machine] for machine in extra.wheels.machines)
     return f"CPython 3.11 to {'.'.join(map(str, extra.wheels.newest))} on {machines}"
+
+
+def kernels_off() -> bool:
+    """Tell whether the environment keeps numba from compiling, as is done to look for faults."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "").strip() not in ("", "0")

@@ -38,6 +38,20 @@ def kept_in(folder):
     return sorted(folder.rglob("*.nbi"))
 
 
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
+def test_what_was_cut_short_is_compiled_anew(module, tmp_path, kind, share):
+    assert module("Once").doubled.__module__ == "of_theirs"
+    once = sys.modules["of_theirs"]
+    once.doubled(once.Once(2.0))
+    [kept] = tmp_path.rglob(kind)
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[: int(share * len(whole))])
+    again = module("Once")
+    assert again.doubled(again.Once(3.0)) == 6.0
+    assert len([*tmp_path.rglob(kind)]) == 1
+
+
 def test_what_another_version_has_kept_of_types_that_are_gone_is_compiled_anew(module, tmp_path):
     theirs = module("Theirs")
     assert theirs.doubled(theirs.Theirs(2.0)) == 4.0
@@ -49,7 +63,17 @@ def test_what_another_version_has_kept_of_types_that_are_gone_is_compiled_anew(m
     assert index.read_bytes() != before
 
 
-@pytest.mark.parametrize("error", [AttributeError("Limits"), EOFError(), ModuleNotFoundError()])
+@pytest.mark.parametrize(
+    "error",
+    [
+        AttributeError("Limits"),
+        EOFError(),
+        ModuleNotFoundError(),
+        RuntimeError("Invalid abbrev number"),
+        UnicodeDecodeError("utf-8", b"", 0, 0, ""),
+        PermissionError(),
+    ],
+)
 def test_what_cannot_be_read_counts_as_nothing(error):
     from dmpcli import compiled
 
@@ -59,6 +83,9 @@ def test_what_cannot_be_read_counts_as_nothing(error):
         def load_overload(self, signature, target):
             raise error
 
+        def save_overload(self, signature, data):
+            raise OSError(28, "No space left on device")
+
         def flush(self):
             self.flushed = True
 
@@ -66,3 +93,4 @@ def test_what_cannot_be_read_counts_as_nothing(error):
     compiled._forgive(kept)
     assert kept.load_overload(None, None) is None
     assert kept.flushed
+    kept.save_overload(None, None)

@@ -92,6 +92,8 @@ def versions(kernels: bool = False) -> dict[str, str]:
     if kernels:
         there = importlib.util.find_spec("numba") is not None
         found["numba"] = importlib.metadata.version("numba") if there else "not installed"
+        if there and extras.kernels_off():
+            found["numba"] = "switched off by NUMBA_DISABLE_JIT"
     return found
 
 

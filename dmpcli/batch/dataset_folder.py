@@ -17,7 +17,7 @@ from dmpcli.batch.ledger import Ledger
 from dmpcli.batch.part import FACT, Job, Outcome, outcome_of
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, parquet, record, schemas
-from dmpcli.records.draft import Draft
+from dmpcli.records.draft import Draft, remove_abandoned
 from dmpcli.records.record import Record
 from dmpcli.records.storage import Stats, each, located
 
@@ -107,7 +107,7 @@ class Folder:
                 told = outcome is not None
                 outcome = outcome or own.get(file)
                 if outcome is None or outcome.number != number or outcome.sites != hashes(number):
-                    (self.path / file).unlink()
+                    (self.path / file).unlink(missing_ok=True)
                     continue
                 kept[number] = outcome
                 if not told:
@@ -130,13 +130,13 @@ class Folder:
             return
         for stale in self.path.glob(f".{file_io.TABLE}.*.tmp") if parts is None else ():
             if stale != but:
-                stale.unlink(missing_ok=True)
+                remove_abandoned(stale)
         for folder in file_io.part_folders(self.path):
             inner = "" if folder == self.path else f"{folder.name}/"
             for half in folder.glob(_TEMPORARY):
                 of = f"{inner}{half.name[1:].split('.parquet.')[0]}.parquet"
                 if parts is None or of in parts:
-                    half.unlink(missing_ok=True)
+                    remove_abandoned(half)
 
     def _outcome(self, name: str, number: int) -> Outcome | None:
         """Outcome of a part that is there, whole and of the same inputs; None otherwise."""
@@ -185,6 +185,9 @@ class Folder:
         """End writing; leave no folder behind that nothing was drawn into."""
         self._ledger.close()
         if self._table is not None:
+            # Else Arrow would do it as Python ends, on a file that is closed, and complain.
+            with contextlib.suppress(OSError, ValueError, pa.ArrowException):
+                self._table[1].close()
             self._table[0].drop()
         if not isinstance(self.path, Path):
             return
@@ -199,13 +202,21 @@ class Folder:
         Raises
         ------
         InputError
-            The folder cannot be written.
+            The folder cannot be written, or somebody else has written into it.
         """
         assert self._table is not None
         draft, table = self._table
         with self._writing():
+            there = file_io.parts_of(self.path)
+            for part in manifest["parts"]:
+                name, size = part["file"], part["bytes"]
+                if name not in there or there[name].st_size != size:
+                    raise InputError(
+                        f"{self.path / name}: another run has removed or replaced it; let one "
+                        "alone draw into a folder: the same command goes on from here"
+                    )
             for stale in self._stale:
-                (self.path / stale).unlink()
+                (self.path / stale).unlink(missing_ok=True)
             # A worker that died in the middle of a part has left its half.
             self._tidy(None, draft.path)
             table.close()

@@ -490,6 +490,8 @@ def _written(job: Job, part: Part, outcome: Outcome, drawn: Record) -> Outcome:
         size = draft.keep()
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
+        if isinstance(error, FileNotFoundError):
+            reason = "somebody removed its folder, or what was written; the same command goes on"
         raise InputError(f"{file}: cannot be written: {reason}") from None
     finally:
         if draft is not None:

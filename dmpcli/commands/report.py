@@ -38,7 +38,7 @@ def command(
         ),
     ] = None,
     surface_cache: Annotated[
-        Path | None,
+        str | None,
         typer.Option(metavar="DIR", help="Keep prepared meshes of --pairs here for later runs."),
     ] = None,
     output: Annotated[

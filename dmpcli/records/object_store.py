@@ -12,9 +12,12 @@ import fnmatch
 import io
 import os
 import random
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import timedelta
 from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import Any, Literal, NamedTuple, overload
@@ -33,6 +36,12 @@ _FIRST_ATTEMPTS = 3
 
 _FIRST_PAUSE, _LONGEST_PAUSE = 0.05, 10.0
 """Before a reading is tried again, s."""
+
+_SECONDS_A_TRY = 5
+"""Of Google's, whose client counts no requests."""
+
+_APART = 60.0
+"""How long Azure's may take to answer the first time, s."""
 
 _BUFFER = 1 << 18
 _SECOND = 10**9
@@ -353,6 +362,13 @@ def _file_system(root: str, tries: int, where: tuple[str, str]) -> tuple[Any, st
     from pyarrow import fs
 
     scheme, _, bucket = root.partition("://")
+    if scheme == "gs":
+        key = os.environ.get("GOOGLE_APPLICATION_CREDENTIALS")
+        if key and not os.path.isfile(key):
+            raise InputError(f"GOOGLE_APPLICATION_CREDENTIALS: {key}: no such file")
+        # By itself it would try for a quarter of an hour, deaf to signals.
+        limit = timedelta(seconds=_SECONDS_A_TRY * tries)
+        return fs.GcsFileSystem(retry_time_limit=limit), bucket
     if scheme != "s3":
         store, path = fs.FileSystem.from_uri(f"{root}/")
         return store, path.strip("/")
@@ -388,12 +404,44 @@ def _reached(root: str, where: tuple[str, str]) -> bool:
     from pyarrow.fs import FileType
 
     path = ObjectPath(root)
+    if root.startswith("abfs"):
+        _ask_apart(root)
     with _told(path):
         store, bucket = _file_system(root, min(_FIRST_ATTEMPTS, attempts()), where)
         [found] = store.get_file_info([bucket])
     if found.type == FileType.NotFound:
         raise no_bucket(path.root)
     return True
+
+
+_ASK = """
+import sys
+from pyarrow import fs
+store, path = fs.FileSystem.from_uri(sys.argv[1] + "/")
+store.get_file_info([path.strip("/")])
+"""
+
+
+def _ask_apart(root: str) -> None:
+    """Ask Azure's store from a process of its own: without credentials Arrow's client ends it.
+
+    Raises
+    ------
+    InputError
+    """
+    ask = [sys.executable, "-c", _ASK, root]
+    try:
+        done = subprocess.run(
+            ask, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            timeout=_APART, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise InstrumentError(f"{root}: the store is not reached; check the network") from None
+    if done.returncode < 0:
+        raise InputError(
+            f"{root}: no credentials for Azure are found: set AZURE_TENANT_ID, AZURE_CLIENT_ID and "
+            "AZURE_CLIENT_SECRET, or sign in by az login"
+        )
 
 
 @contextlib.contextmanager

@@ -25,6 +25,15 @@ _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://(.*)", re.DOTALL)
 _FLAT = re.compile(rf"(?:{'|'.join(SCHEMES)}|file):/(?!/)", re.IGNORECASE)
 _PASSWORD = re.compile(r"(?<=://)[^/\s@]*:[^\s@]*@")
 _IN_BUCKET = re.compile(r"((?:^|=)(?:s3|gs)://)(?=[^/\s]*[:@])\S*", re.IGNORECASE)
+# What signs a link (S3's X-Amz-Signature, Azure's sig), and the keys that Arrow's own names take.
+_SIGNED = re.compile(
+    r"((?:^|=)(?:https?|ftp|s3[an]?|gc?s|abfss?|az|adl|wasbs?)://[^?\s]*\?)\S*=\S*", re.IGNORECASE
+)
+_OPTIONS = re.compile(
+    r"(?:^|&)(?:access_key|secret_key|session_token|region|scheme|endpoint_override|"
+    r"allow_bucket_(?:creation|deletion)|account_key|sas_token|sig|x-(?:amz|goog)-\w[\w-]*)=",
+    re.IGNORECASE,
+)
 
 _HINTS = {"s3a": "s3", "s3n": "s3", "gcs": "gs", "az": "abfs", "adl": "abfs", "wasb": "abfs"}
 
@@ -66,8 +75,8 @@ def located(name: str | Location) -> Location:
     if found is None:
         if _FLAT.match(text):
             raise InputError(
-                f"{text}: names a store, which fit, generalize, execute, report and inspect read "
-                "(with two slashes); elsewhere copy the file to this machine first"
+                f"{hidden(text)}: names a store, which fit, generalize, execute, report and "
+                "inspect read (with two slashes); elsewhere copy the file to this machine first"
             )
         return name if isinstance(name, Path) else Path(text)
     scheme, rest = found[1].lower(), found[2]
@@ -75,6 +84,8 @@ def located(name: str | Location) -> Location:
         return _local(text, rest)
     if scheme not in SCHEMES:
         hint = f"{_HINTS[scheme]}:// is meant" if scheme in _HINTS else "it is no kind of storage"
+        if scheme in ("http", "https", "ftp"):
+            hint = "it is no kind of storage, copy the file to this machine or into a bucket"
         raise InputError(
             f"{hidden(text)}: {hint}; s3://, gs://, abfs:// and file:// are known, and files"
         )
@@ -97,7 +108,18 @@ def _in_store(scheme: str, rest: str) -> ObjectPath:
             "(docs/storage.md)"
         )
     if not bucket or any(sign.isspace() for sign in bucket):
-        raise InputError(f"{scheme}://{rest}: names no bucket, as in {scheme}://BUCKET/NAME")
+        text = hidden(f"{scheme}://{rest}")
+        raise InputError(f"{text}: names no bucket, as in {scheme}://BUCKET/NAME")
+    if scheme.startswith("abfs") and "@" not in bucket:
+        raise InputError(
+            f"{hidden(f'{scheme}://{rest}')}: names no account, as in "
+            f"{scheme}://CONTAINER@ACCOUNT.dfs.core.windows.net/NAME"
+        )
+    if _OPTIONS.search(key.partition("?")[2]):
+        raise InputError(
+            f"{hidden(f'{scheme}://{rest}')}: a name holds no options and no signature; what "
+            "they say comes from the environment (docs/storage.md)"
+        )
     root = ObjectPath(f"{scheme}://{bucket}")
     key = key.rstrip("/")
     return root / key if key else root
@@ -152,4 +174,4 @@ def each(folder: Location, ask: Callable[[T], R], items: Iterable[T]) -> list[R]
 
 def hidden(text: str) -> str:
     """Return a word of the command line without what may be a password or a key."""
-    return _PASSWORD.sub("***@", _IN_BUCKET.sub(r"\1***", text))
+    return _PASSWORD.sub("***@", _SIGNED.sub(r"\1***", _IN_BUCKET.sub(r"\1***", text)))

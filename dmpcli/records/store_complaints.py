@@ -48,10 +48,12 @@ def complaint(root: str, path: str, text: str, tried: int) -> DmpError:
             "goes on from here, later or with fewer --jobs"
         )
     if _LOST.search(code) or _LOST.search(text):
-        return InstrumentError(
-            f"{path}: the store is not reached ({code}); check the network, and AWS_ENDPOINT_URL "
-            "if it is not Amazon's"
-        )
+        what = "the network"
+        if root.startswith("s3:"):
+            what += ", and AWS_ENDPOINT_URL if it is not Amazon's"
+        elif root.startswith("gs:"):
+            what += ", and that credentials are set: GOOGLE_APPLICATION_CREDENTIALS=FILE"
+        return InstrumentError(f"{path}: the store is not reached ({code}); check {what}")
     return InstrumentError(f"{path}: the store fails ({code}); the same command goes on from here")
 
 

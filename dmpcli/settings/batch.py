@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
@@ -36,7 +35,7 @@ class BatchOptions(Settings):
         int, Ge(1), Le(10_000), Option("Surfaces in one file, where the table names them.")
     ] = 16
     surface_cache: Annotated[
-        Path | None,
+        str | None,
         Option("Keep prepared meshes here for later runs.", metavar="DIR", unset="none"),
     ] = None
     float32: Annotated[bool, Option("Store poses in single precision.")] = False

@@ -75,7 +75,7 @@ class Otherwise:
 
 
 def prepared_sites(
-    order: Order, folder: Location, otherwise: Otherwise, cache: Path | None = None
+    order: Order, folder: Location, otherwise: Otherwise, cache: str | None = None
 ) -> Ready:
     """Check an order whose table names surfaces, as far as the table alone can tell.
 
@@ -86,7 +86,7 @@ def prepared_sites(
     folder : Path or ObjectPath
         Of the table: its relative names start there.
     otherwise : Otherwise
-    cache : Path, optional
+    cache : str, optional
         Folder of prepared meshes.
 
     Raises

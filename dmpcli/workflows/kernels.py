@@ -15,7 +15,7 @@ import pyarrow as pa
 from dmpcli import extras
 from dmpcli.dmp.options import Kernels, Means
 from dmpcli.errors import InputError
-from dmpcli.messages import tell
+from dmpcli.messages import tell, warn
 from dmpcli.records import file_io, parquet, record
 from dmpcli.records.storage import Location
 
@@ -53,12 +53,14 @@ def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Location
         Kernels are asked for, or were used in the folder, and numba is not here.
     """
     if asked == "compiled":
-        extras.load(extras.FAST, "--kernels compiled", "numba")
+        _must_be_there()
         return "compiled"
     if asked == "pure":
         return "pure"
     before = recorded(output)
     if before is not None:
+        if before == "compiled" and extras.kernels_off():
+            raise InputError(f"{output}: was begun with --kernels compiled; {_SWITCHED_OFF}")
         if before == "compiled" and not there():
             raise InputError(
                 f"{output}: was begun with --kernels compiled, which needs numba, not installed "
@@ -69,9 +71,20 @@ def means(asked: Kernels, rows: int, mesh: bool, turning: bool, output: Location
     return "compiled" if many and there() else "pure"
 
 
+_SWITCHED_OFF = (
+    "NUMBA_DISABLE_JIT keeps numba from compiling: unset it, or give --kernels pure to draw it anew"
+)
+
+
 def there() -> bool:
     """Tell whether kernels can be compiled here, without loading what does it."""
-    return importlib.util.find_spec("numba") is not None
+    return importlib.util.find_spec("numba") is not None and not extras.kernels_off()
+
+
+def _must_be_there() -> None:
+    extras.load(extras.FAST, "--kernels compiled", "numba")
+    if extras.kernels_off():
+        raise InputError(f"--kernels compiled: {_SWITCHED_OFF}")
 
 
 def recorded(output: Location) -> Means | None:
@@ -103,7 +116,7 @@ def to_measure(asked: Kernels, strokes: int, on_mesh: bool) -> Means:
         Kernels are asked for, and numba is not here.
     """
     if asked == "compiled":
-        extras.load(extras.FAST, "--kernels compiled", "numba")
+        _must_be_there()
         return "compiled"
     many = strokes >= (MANY_ON_MESH if on_mesh else MANY_TO_MEASURE)
     return "compiled" if asked == "auto" and many and there() else "pure"
@@ -121,9 +134,16 @@ def get_ready(ready: "CompiledKernels | None" = None) -> None:
     Those that draw, unless a module names others.
     """
     ready = _to_draw() if ready is None else ready
-    if not kept(ready):
-        tell("kernels are compiled, once on this machine; it takes some 20 s of a processor")
+    if kept(ready):
+        ready.load()
+        return
+    tell("kernels are compiled, once on this machine; it takes some 20 s of a processor")
     ready.load()
+    if not kept(ready):
+        warn(
+            "what was compiled cannot be kept, so each process and the next command compile again: "
+            "name a folder that can be written, and has room, as NUMBA_CACHE_DIR"
+        )
 
 
 class CompiledKernels(Protocol):

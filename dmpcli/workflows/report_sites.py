@@ -30,7 +30,7 @@ class SiteGrounds:
         Of the table that a batch was drawn from.
     otherwise : Otherwise
         What the command line says where the table says nothing.
-    cache : Path, optional
+    cache : str, optional
         Folder of prepared meshes.
 
     Raises
@@ -39,7 +39,7 @@ class SiteGrounds:
         The table cannot be read, or names no surfaces.
     """
 
-    def __init__(self, path: Location, otherwise: Otherwise, cache: Path | None = None) -> None:
+    def __init__(self, path: Location, otherwise: Otherwise, cache: str | None = None) -> None:
         source = file_io.read(path)
         table = pairs.read(source)
         if table.places is None:

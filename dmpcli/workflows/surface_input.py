@@ -132,7 +132,7 @@ def read(
     return placed_input(source, pose, placed, unit, store=store, summary=summary)
 
 
-def store_in(folder: Path | None, kernels: bool = False) -> "MeshStore":
+def store_in(folder: str | None, kernels: bool = False) -> "MeshStore":
     """Return what reads surfaces, and keeps prepared meshes, for kernels or not, in a folder.
 
     Raises
@@ -141,10 +141,18 @@ def store_in(folder: Path | None, kernels: bool = False) -> "MeshStore":
         There is something else of the folder's name.
     """
     from dmpcli.records.mesh_store import MeshStore
+    from dmpcli.records.storage import located
 
-    if folder is not None and folder.exists() and not folder.is_dir():
-        raise InputError(f"--surface-cache: {folder} is no folder; name one, or leave it out")
-    return MeshStore(None if folder is None else str(folder.absolute()), kernels=kernels)
+    if folder is None:
+        return MeshStore(None, kernels=kernels)
+    place = located(folder)
+    if not isinstance(place, Path):
+        raise InputError(
+            f"--surface-cache: {place} is a store's; name a folder of this machine, or leave it out"
+        )
+    if place.exists() and not place.is_dir():
+        raise InputError(f"--surface-cache: {place} is no folder; name one, or leave it out")
+    return MeshStore(str(place.absolute()), kernels=kernels)
 
 
 def placed_input(

@@ -13,9 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from dmpcli import cli
+from dmpcli.batch import dataset_folder
 from dmpcli.dmp.learning import fit
 from dmpcli.dmp.options import FitOptions
-from dmpcli.records import file_io, manifest, record, skill
+from dmpcli.records import draft, file_io, manifest, record, skill
 from dmpcli.records.record import Provenance
 from tests.dmp.strokes import paper_stroke
 
@@ -249,3 +250,54 @@ def test_metadata_tell_neither_who_drew_nor_where(whole):
     text = json.dumps(json.loads(whole[1]["_manifest.json"]))
     for word in ("jobs", "shard", "cluster", "/tmp", os.uname().nodename):
         assert word not in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [(), ("--shard", "1/1")])
+def test_a_second_run_of_the_same_batch_meanwhile_harms_neither(
+    learned, whole, tmp_path, monkeypatch, share
+):
+    """As a batch system has it that starts a task anew which it took for lost."""
+    table, files = whole
+    keep, begun = draft.Draft.keep, []
+
+    def meanwhile(self):
+        begun.append(self)
+        if len(begun) == 3:
+            run(learned, tmp_path / "b", table, "--on-error", "skip", *share)
+        return keep(self)
+
+    monkeypatch.setattr(draft.Draft, "keep", meanwhile)
+    run(learned, tmp_path / "b", table, "--on-error", "skip")
+    assert content(tmp_path / "b") == files
+
+
+@pytest.mark.slow
+def test_a_run_whose_parts_another_one_replaced_does_not_end_well(
+    learned, whole, tmp_path, monkeypatch
+):
+    table, _ = whole
+    finish = dataset_folder.Folder.finish
+
+    def meanwhile(self, manifest):
+        monkeypatch.setattr(dataset_folder.Folder, "finish", finish)
+        run(learned, tmp_path / "b", table, "--on-error", "skip", "--float32")
+        finish(self, manifest)
+
+    monkeypatch.setattr(dataset_folder.Folder, "finish", meanwhile)
+    told = run(learned, tmp_path / "b", table, "--on-error", "skip", code=2)
+    assert "part-00000.parquet: another run has removed or replaced it" in told
+
+
+def test_a_part_whose_folder_is_gone_is_told_with_what_to_do(learned, whole, tmp_path, monkeypatch):
+    table, _ = whole
+    settle = record.store
+
+    def meanwhile(drawn, stream, form):
+        for half in (tmp_path / "b").glob(".part-*"):
+            half.unlink()
+        settle(drawn, stream, form)
+
+    monkeypatch.setattr(record, "store", meanwhile)
+    told = run(learned, tmp_path / "b", table, "--on-error", "skip", code=2)
+    assert "somebody removed its folder, or what was written; the same command goes on" in told

@@ -162,6 +162,18 @@ def test_kernels_that_are_asked_for_and_not_here_are_refused_with_the_line_that_
     assert kernels.means("pure", 10**6, True, True, tmp_path) == "pure"
 
 
+@needs(extras.FAST)
+def test_numba_that_is_switched_off_is_as_good_as_none(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    with pytest.raises(InputError, match="NUMBA_DISABLE_JIT keeps numba from compiling: unset it"):
+        kernels.means("compiled", 5, True, False, tmp_path)
+    assert kernels.means("auto", 10**6, True, True, tmp_path / "none") == "pure"
+    assert "NUMBA_DISABLE_JIT" in cluster.versions(kernels=True)["numba"]
+    monkeypatch.setattr(kernels, "recorded", lambda _: "compiled")
+    with pytest.raises(InputError, match=r"was begun with --kernels compiled; NUMBA_DISABLE_JIT"):
+        kernels.means("auto", 10**6, True, True, tmp_path)
+
+
 def test_workers_of_a_job_with_kernels_are_asked_for_numba_and_no_others(monkeypatch):
     assert "numba" not in cluster.versions()
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
@@ -175,10 +187,20 @@ def test_the_first_compile_is_told_in_one_line(monkeypatch, caplog):
 
     ready.load()
     assert kernels.kept()
-    monkeypatch.setattr(ready, "load", lambda: None)
-    for folder, lines in ((None, 0), ("/nowhere", 1)):
-        if folder is not None:
+    places = ready.files()
+
+    def told(load, nowhere):
+        caplog.clear()
+        monkeypatch.setattr(ready, "load", load)
+        if nowhere:
             monkeypatch.setattr(ready, "files", lambda: [("/nowhere", ".lift-")])
         with caplog.at_level("INFO", logger="dmpcli"):
             kernels.get_ready()
-        assert len(caplog.records) == lines
+        return [entry.getMessage() for entry in caplog.records]
+
+    assert told(lambda: None, nowhere=False) == []
+    [line] = told(lambda: monkeypatch.setattr(ready, "files", lambda: places), nowhere=True)
+    assert "kernels are compiled, once on this machine" in line
+    _, doubt = told(lambda: None, nowhere=True)
+    assert "cannot be kept" in doubt
+    assert "NUMBA_CACHE_DIR" in doubt

@@ -283,6 +283,10 @@ def test_options_of_surfaces_say_something(shop, tmp_path):
     assert len(list((tmp_path / "kept").iterdir())) == 1
     told = dmpcli(*words, *part, "--surface-cache", flat, code=2).stderr
     assert "flat.csv is no folder; name one, or leave it out" in told
+    told = dmpcli(*words, *part, "--surface-cache", "s3://bucket/kept", code=2).stderr
+    assert "--surface-cache: s3://bucket/kept is a store's; name a folder of this machine" in told
+    dmpcli(*words, *part, "--surface-cache", f"file://{tmp_path}/named")
+    assert len(list((tmp_path / "named").iterdir())) == 1
 
 
 @pytest.mark.thorough

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 
 import pytest
@@ -101,3 +102,24 @@ def test_a_signal_at_any_line_of_execute_loses_nothing(quick, tmp_path, tmp_path
     seen = swept(["execute", str(folder / "t.parquet")], tmp_path, 1, 29)
     assert (0, True) in seen
     assert (143, False) in seen
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_comes_as_an_object_is_cleared_away_is_not_lost(number):
+    """Python ignores what is raised there; compiling clears away many objects of llvmlite."""
+    program = f"""
+import os, signal, time
+from dmpcli import cli
+class Cleared:
+    def __del__(self):
+        os.kill(os.getpid(), {int(number)})
+        sum(range(1000))
+def work():
+    Cleared()
+    time.sleep(30)
+cli.app = work
+cli.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode in (128 + number, -number)
+    assert "Exception ignored" not in done.stderr

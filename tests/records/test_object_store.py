@@ -254,6 +254,23 @@ def test_other_stores_come_from_the_same_code(monkeypatch):
     assert bucket == "box"
 
 
+def test_a_key_file_that_is_not_there_is_told(monkeypatch):
+    monkeypatch.setenv("GOOGLE_APPLICATION_CREDENTIALS", "/no/key.json")
+    with pytest.raises(
+        InputError, match=r"^GOOGLE_APPLICATION_CREDENTIALS: /no/key\.json: no such"
+    ):
+        object_store._file_system("gs://bucket", 2, ("", ""))
+
+
+@pytest.mark.parametrize("text", ["import os; os.abort()", "import time; time.sleep(60)"])
+def test_a_client_that_ends_its_process_or_never_answers_is_told(monkeypatch, text):
+    """Arrow's for Azure ends by abort where no credentials are found."""
+    monkeypatch.setattr(object_store, "_ASK", text)
+    monkeypatch.setattr(object_store, "_APART", 5.0)
+    with pytest.raises((InputError, InstrumentError), match=r"credentials for Azure|not reached"):
+        ObjectPath("abfs://box@account.dfs.core.windows.net", "k").exists()
+
+
 def test_a_draft_is_sent_when_it_is_whole_and_not_before(store):
     draft = Draft(at("d"))
     draft.stream.write(b"half")

@@ -54,7 +54,7 @@ def test_file_urls_of_no_whole_path_are_refused(url):
             "abfs://box@account.dfs.core.windows.net",
             "k",
         ),
-        ("abfss://box/k", "abfss://box", "k"),
+        ("abfss://box@a.net/k", "abfss://box@a.net", "k"),
     ],
 )
 def test_keys_stand_in_a_name_as_they_are(url, root, key):
@@ -112,11 +112,51 @@ def test_credentials_in_a_name_are_refused_and_shown_nowhere(url):
         assert SECRET.split("/")[1] not in word
 
 
+SIGNED = "X-Amz-Credential=AKIA123&X-Amz-Signature=0f0f0f&X-Amz-Security-Token=TOKEN"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        f"https://bucket.s3.amazonaws.com/in/p.csv?{SIGNED}",
+        f"HTTPS://bucket.s3.amazonaws.com/in/p.csv?list-type=2&{SIGNED}",
+        f"s3://bucket/p.csv?{SIGNED}",
+        f"s3a://bucket/p.csv?{SIGNED}",
+        "s3://bucket/p.csv?access_key=AKIA123&secret_key=0f0f0f",
+        "abfs://box@account.dfs.core.windows.net/p.csv?sv=2022-11-02&sig=0f0f0f",
+        "https://account.blob.core.windows.net/box/p.csv?sv=2022-11-02&sig=0f0f0f",
+        "wasbs://box@account.blob.core.windows.net/p.csv?sv=2022-11-02&sig=0f0f0f",
+    ],
+)
+def test_what_signs_a_link_is_shown_nowhere(url):
+    with pytest.raises(InputError) as error:
+        located(url)
+    for word in (str(error.value), hidden(url), hidden(f"--pairs={url}"), hidden(f"-o={url}")):
+        assert "p.csv?***" in word
+        assert not any(secret in word for secret in ("0f0f0f", "AKIA123", "TOKEN"))
+
+
+@pytest.mark.parametrize("option", ["region=us-east-1", "a=b&endpoint_override=localhost:9000"])
+def test_options_as_arrows_own_names_take_them_are_refused_and_not_part_of_a_key(option):
+    with pytest.raises(InputError, match="holds no options"):
+        located(f"s3://bucket/batch?{option}")
+
+
+def test_a_question_mark_may_be_part_of_a_key():
+    assert located("s3://bucket/what?.csv") == ObjectPath("s3://bucket", "what?.csv")
+
+
+def test_azures_names_have_an_account():
+    with pytest.raises(InputError, match="names no account, as in abfs://CONTAINER@ACCOUNT"):
+        located("abfs://box/key")
+
+
 def test_what_holds_no_credentials_is_shown_as_it_is():
     for word in (
         "s3://bucket/a@b:c",
         "tcp://host:8786",
         "elite://192.168.1.20:8055?mode=file",
+        "s3://bucket/what?.csv",
         "abfs://box@account.dfs.core.windows.net/k",
         "a:b@c",
     ):
