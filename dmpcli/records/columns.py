@@ -168,6 +168,13 @@ def joined(chunked: Any) -> AnyArray:
     return found
 
 
+def arrow(values: AnyArray) -> Any:
+    """Arrow array over an array of numbers, shape (rows,): pa.array would import pandas."""
+    kind = pa.from_numpy_dtype(values.dtype)
+    data = pa.py_buffer(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(kind, len(values), [None, data])
+
+
 def all_within(values: AnyArray, largest: float) -> bool:
     """Tell whether no value is NaN or further from 0 than `largest`; takes no memory."""
     return not len(values) or bool(values.min() >= -largest and values.max() <= largest)

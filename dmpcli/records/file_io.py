@@ -79,7 +79,7 @@ def read(path: str | Location, journal: bool = False) -> Source:
             if size > LARGEST and not journal:
                 raise _too_large(str(path), f"{size / 2**30:.1f} GiB")
             with file.open("rb") as stream:
-                source = Source(str(path), _limited(str(path), stream, journal))
+                source = Source(str(path), _limited(str(path), stream, journal, min(size, LARGEST)))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file; check the name") from None
         except OSError as error:
@@ -107,11 +107,23 @@ def _checked(source: Source, path: str | Location, journal: bool) -> Source:
     return source
 
 
-def _limited(name: str, stream: BinaryIO, journal: bool) -> bytes:
-    """Read a stream to its end, which not every one has: a device or a pipe may go on for ever."""
+def _limited(name: str, stream: BinaryIO, journal: bool, size: int = LARGEST) -> bytes:
+    """Read a stream to its end, which not every one has: a device or a pipe may go on for ever.
+
+    Parameters
+    ----------
+    name : str
+        What messages call it.
+    stream : binary file
+    journal : bool
+    size : int
+        Bytes that are expected: room for many more takes longer to make than a part to be read.
+    """
     if journal:
         return stream.read()
-    content = stream.read(LARGEST + 1)
+    content = stream.read(size + 1)
+    if len(content) > size:
+        content += stream.read(LARGEST + 1 - len(content))
     if len(content) > LARGEST:
         raise _too_large(name, f"over {LARGEST / 2**30:.0f} GiB")
     return content

@@ -8,11 +8,13 @@ read is as good as none.
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +124,7 @@ class MeshStore:
         placed = (
             None if pose is None else [*pose.position.tolist(), *pose.rotation.ravel().tolist()]
         )
-        made_by = [FORMAT, __version__, np.__version__, scipy.__version__, _igl_version()]
-        told = json.dumps([source.sha256, unit or "mm", placed, made_by])
+        told = json.dumps([source.sha256, unit or "mm", placed, _made_by()])
         return Path(self.folder) / (hashlib.sha256(told.encode()).hexdigest() + _SUFFIX)
 
     def _keep(self, entry: Path, found: MeshFile, mesh: Mesh) -> None:
@@ -159,10 +160,12 @@ class MeshStore:
             size -= bytes_of
 
 
-def _igl_version() -> str:
-    from importlib.metadata import version
+@cache
+def _made_by() -> list[int | str]:
+    """Versions of what prepares a mesh."""
+    from importlib.metadata import version  # looks through folders
 
-    return version("libigl")
+    return [FORMAT, __version__, np.__version__, scipy.__version__, version("libigl")]
 
 
 def _packed(found: MeshFile, mesh: Mesh, kernels: bool) -> dict[str, AnyArray]:
@@ -181,12 +184,33 @@ def _packed(found: MeshFile, mesh: Mesh, kernels: bool) -> dict[str, AnyArray]:
     return packed
 
 
+def _unpacked(entry: Path) -> dict[str, AnyArray]:
+    """Return the arrays of an entry, which may not be written to: np.load copies each twice.
+
+    Raises
+    ------
+    OSError, ValueError, zipfile.BadZipFile
+        There is none, or a damaged one.
+    """
+    held = {}
+    with zipfile.ZipFile(entry) as packed:
+        for name in packed.namelist():
+            content = packed.read(name)
+            stream = io.BytesIO(content)
+            np.lib.format.read_magic(stream)
+            shape, by_columns, kind = np.lib.format.read_array_header_1_0(stream)
+            values = np.frombuffer(content, dtype=kind, offset=stream.tell())
+            held[name.removesuffix(".npy")] = values.reshape(
+                shape, order="F" if by_columns else "C"
+            )
+    return held
+
+
 def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
     """Return the mesh of an entry; None where there is none, or a damaged one."""
     try:
-        with np.load(entry, allow_pickle=False) as packed:
-            held = {name: packed[name] for name in packed.files}
-        V, F = held["V"].astype(float, copy=False), _whole(held["F"])
+        held = _unpacked(entry)
+        V, F = held["V"].astype(float), _whole(held["F"])
         pieces = held.get("components")
         components = np.zeros(len(F), dtype=np.int64) if pieces is None else _whole(pieces)
         adjacency = Adjacency(_whole(held["neighbours"]), components)
@@ -195,7 +219,7 @@ def _kept(entry: Path) -> tuple[MeshFile, Mesh] | None:
         remarks = json.loads(held["remarks"].tobytes())
         mesh = Mesh(V, F, adjacency)
         if "order" in held:
-            mesh.know_order(held["order"], held["first"])
+            mesh.know_order(held["order"].copy(), held["first"].copy())
     except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
         return None
     return MeshFile(V, F, remarks, adjacency), mesh
@@ -219,9 +243,12 @@ def _sound(V: Floats, F: Integers, adjacency: Adjacency, held: Mapping[str, AnyA
     if not sound or "order" not in held:
         return sound
     order, first = held["order"], held["first"]
-    leaves = len(first) - 1
+    leaves, there = len(first) - 1, np.zeros(count, dtype=bool)
+    if order.shape != (count,) or order.min() < 0 or order.max() >= count:
+        return False
+    there[order] = True
     return (
-        np.array_equal(np.sort(order), np.arange(count))
+        bool(there.all())
         and 0 < leaves <= 2 * count
         and leaves & (leaves - 1) == 0
         and bool((np.diff(first) >= 0).all())

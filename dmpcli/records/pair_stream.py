@@ -18,7 +18,7 @@ import pyarrow as pa
 
 from dmpcli.arrays import Booleans, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import file_io, pairs, parquet, schemas, tables, untrusted
+from dmpcli.records import columns, file_io, pairs, parquet, schemas, tables, untrusted
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.storage import Location
@@ -180,7 +180,7 @@ class PairStream:
                 yield tables.of_arrow(name, pa.Table.from_batches(waiting), numbers), unknown
 
     def _batches(
-        self, file: Any, rows: int, columns: list[str]
+        self, file: Any, rows: int, wanted: list[str]
     ) -> Iterator[tuple[pa.RecordBatch, Integers]]:
         """Yield what is asked for of a Parquet file, at most so many rows at once, and which."""
         begin = 0
@@ -189,11 +189,11 @@ class PairStream:
             if self.share is not None and not self.share.count(end) > self.share.count(begin):
                 begin = end
                 continue
-            for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
+            for batch in file.iter_batches(rows, row_groups=[group], columns=wanted):
                 there = np.arange(begin, begin + len(batch))
                 if self.share is not None:
                     there = self.share.rows(begin, begin + len(batch))
-                    some = batch.take(pa.array(there - begin))
+                    some = batch.take(columns.arrow(there - begin))
                 else:
                     some = batch
                 begin += len(batch)
@@ -248,13 +248,13 @@ def _joined(one: tables.Table, other: tables.Table) -> tables.Table:
     assert other.lines is not None
     assert one.rows is not None
     assert other.rows is not None
-    columns = {
+    joined = {
         name: pa.concat_arrays([values, other.columns[name]])
         for name, values in one.columns.items()
     }
     return replace(
         other,
-        columns=columns,
+        columns=joined,
         lines=np.concatenate([one.lines, other.lines]),
         rows=np.concatenate([one.rows, other.rows]),
     )
@@ -263,8 +263,8 @@ def _joined(one: tables.Table, other: tables.Table) -> tables.Table:
 def _some(table: tables.Table, rows: slice) -> tables.Table:
     assert table.lines is not None
     assert table.rows is not None
-    columns = {name: values[rows] for name, values in table.columns.items()}
-    return replace(table, columns=columns, lines=table.lines[rows], rows=table.rows[rows])
+    some = {name: values[rows] for name, values in table.columns.items()}
+    return replace(table, columns=some, lines=table.lines[rows], rows=table.rows[rows])
 
 
 def _further(text: str, head: int, lines: Integers) -> str:

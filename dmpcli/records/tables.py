@@ -321,22 +321,22 @@ def without_blank_rows(table: Table) -> Table:
     """
     import pyarrow.compute as pc
 
-    columns = table.columns
+    held = table.columns
     if table.lines is None or table.rows is not None:
         return table
-    if not all(map(_is_text_array, columns.values())):
+    if not all(map(_is_text_array, held.values())):
         return table
     blank = np.ones(len(table), dtype=bool)
-    for values in columns.values():
+    for values in held.values():
         here = np.flatnonzero(blank)
         if not len(here):
             return table
-        cells = pc.utf8_trim_whitespace(values.take(pa.array(here)))
+        cells = pc.utf8_trim_whitespace(values.take(columns.arrow(here)))
         blank[here] = np.array(pc.equal(cells, "").to_pylist(), dtype=bool)
     kept = np.flatnonzero(~blank)
     if len(kept) in (0, len(table)):
         return table
-    some = {name: values.take(pa.array(kept)) for name, values in columns.items()}
+    some = {name: values.take(columns.arrow(kept)) for name, values in held.items()}
     return replace(table, columns=some, lines=table.lines[kept])
 
 

@@ -22,9 +22,12 @@ from dmpcli.surfaces.topology import Topology
 CREASE = 30.0
 """Faces that meet at more than this angle, degrees, are meant to: no chord of a smooth surface."""
 
+HALF_CREASE = np.cos(np.radians(0.5 * CREASE))
+"""Cosine of half that angle."""
+
 # Facets of one arc may differ in width, and surfaces bend more in one direction than across an
 # edge: heights up to so many times those across edges are believed.
-_UNEVEN = 3.0
+UNEVEN = 3.0
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,13 @@ def heights(corners: Floats, normals: Floats, after: Integers, angles: Floats) -
     smooth = (after >= 0) & (angles < np.radians(CREASE))
     width = np.minimum(area[:, None], area.take(after)) / length(edges)[..., 0]
     largest = np.max(np.where(smooth, width * angles / 8.0, 0.0), axis=1)
-    return np.asarray(np.minimum(worst, _UNEVEN * largest))
+    return np.asarray(np.minimum(worst, UNEVEN * largest))
+
+
+def mean_normals(V: Floats, F: Integers) -> Floats:
+    """Unit normals at vertices, shape (n, 3), by the areas of the faces about them."""
+    weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_AREA
+    return np.asarray(igl.per_vertex_normals(V, F, weighting))
 
 
 def split_normals(V: Floats, F: Integers, face_normals: Floats) -> Floats:
@@ -105,10 +114,9 @@ def split_normals(V: Floats, F: Integers, face_normals: Floats) -> Floats:
     face_normals : array, shape (m, 3)
         Unit vectors.
     """
-    weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_AREA
-    normals: Floats = igl.per_vertex_normals(V, F, weighting).take(F, axis=0)
+    normals = mean_normals(V, F).take(F, axis=0)
     # Where no face leans off the mean about a vertex by half a crease, no two meet at one.
-    leaning = dot(normals, face_normals[:, None])[..., 0] < np.cos(np.radians(0.5 * CREASE))
+    leaning = dot(normals, face_normals[:, None])[..., 0] < HALF_CREASE
     bent = np.zeros(len(V), dtype=bool)
     bent[F[leaning]] = True
     if bent.any():

@@ -69,6 +69,13 @@ class LocalShape:
         self._box: tuple[Floats, Floats] | None = None
         self.expecting = False
 
+    def beside(self, whole: MeshShape) -> "LocalShape":
+        """Return one of the same mesh, found by other means, that expects the same."""
+        other = LocalShape(whole)
+        other._lines, other._box = list(self._lines), self._box
+        other._all, other.expecting = self._all, self.expecting
+        return other
+
     def use_whole(self) -> None:
         """Cut no more: the shape of all faces is known, or soon will be."""
         self._all, self._patch = True, None
@@ -119,16 +126,16 @@ class LocalShape:
         inner : array of bool, shape (k,)
             Those about whose vertices all faces are known.
         """
-        every: Integers = np.arange(len(self._whole.F))
-        if self._all:
+        every: Integers = np.arange(len(self._whole.F) if self._all else 0)
+        if self._all or self._patch is None:
             return self._whole, every, every, np.ones(len(every), dtype=bool)
-        number = np.full(len(every), -1) if self._patch is None else self._patch.number
-        faces = np.flatnonzero(number >= 0)
+        F, number = self._whole.F, self._patch.number
+        known = number >= 0
+        faces = np.flatnonzero(known)
         rim = np.zeros(len(self._whole.V), dtype=bool)
-        rim[self._whole.F[number < 0]] = True
-        shape = self._whole if self._patch is None else self._patch.shape
-        inner = np.logical_not(np.any(rim[self._whole.F[faces]], axis=1))
-        return shape, faces, number[faces], np.asarray(inner)
+        rim[F.compress(~known, axis=0)] = True
+        a, b, c = rim.take(F.take(faces, axis=0)).T
+        return self._patch.shape, faces, number.take(faces), np.asarray(~(a | b | c))
 
     def _grow(self, face: Integers) -> None:
         """Cut out a larger patch, about these faces too."""
@@ -160,8 +167,9 @@ class LocalShape:
         for start, goal, width in self._lines:
             size = float(np.linalg.norm(goal - start))
             along = (goal - start) / size if size > 0.0 else np.zeros(3)
-            u = dot(at - start, along)[:, 0]
-            v = np.sqrt(np.maximum(dot(at - start, at - start)[:, 0] - u * u, 0.0))
+            away = at - start
+            u = dot(away, along)[:, 0]
+            v = np.sqrt(np.maximum(dot(away, away)[:, 0] - u * u, 0.0))
             # No further beyond the ends than a quarter of the way to the sides.
             ends = np.abs(u - 0.5 * size) - 0.5 * size - (0.25 if size > 0.0 else 1.0) * width
             nearest = np.minimum(nearest, np.maximum(v - width, ends))
@@ -184,7 +192,7 @@ def _cut(whole: MeshShape, inside: Booleans) -> _Patch:
     across = np.where(across >= 0, number.take(across), across)
     topology = Topology(F, len(V))
     topology.know(Adjacency(across, whole.topology.components[faces]))
-    shape = MeshShape(V, F, topology)
+    shape = type(whole)(V, F, topology)
     rings = _rings(whole.F, F, used)
     known = rings >= _OF_NORMALS
     if (shape.noise[rings >= _OF_NOISE] > 0.0).any():

@@ -22,12 +22,12 @@ _MIXED, _LESS_MIXED = 0.65, 0.5
 # Tilt of facets against the normals around them, by the angle to their neighbours, as a mean over
 # the area: 0.6 to 0.85 of noise of 3 to 7 % of an edge, below 0.52 of smooth shapes with ten edges
 # or more to the wave.
-_TILTED, _LESS_TILTED = 0.6, 0.55
+TILTED, _LESS_TILTED = 0.6, 0.55
 # That share of what is around must be surely noise, and the tilt one ring about a face this much.
 _SEED, _ITSELF = 0.15, 0.5
 # Edges less bent than this are flat, degrees; those more bent than the other are meant to be: noise
 # of a tenth of an edge leaves one in a hundred so, and the rims of bores would pass for it.
-_LEAST, _MOST = 0.5, 60.0
+LEAST, _MOST = 0.5, 60.0
 # What is around a face: those that share a vertex with it, three times over.
 _RINGS = 3
 # Rounds of averaging. More of them carry strokes better over gentle shapes, worse over lively ones.
@@ -62,14 +62,14 @@ def noise(
     tilt = np.arcsin(np.minimum(length(cross(face_normals, around))[:, 0], 1.0))
     between = np.radians(dihedrals.mean(axis=1))
     # A mean of ratios: the large angles of noise must not speak for a smooth region beside it.
-    own = np.minimum(tilt / np.maximum(between, 1e-9), 1.0) * (between > np.radians(_LEAST))
-    if own.max(initial=0.0) < (1.0 - 1e-9) * _TILTED:
+    own = np.minimum(tilt / np.maximum(between, 1e-9), 1.0) * (between > np.radians(LEAST))
+    if own.max(initial=0.0) < (1.0 - 1e-9) * TILTED:
         return np.zeros(len(corners))  # nor are means above it
     edges = np.roll(corners, -1, axis=1) - corners
     after = topology.neighbours
     # Positive at convex edges: the normals turn about the edge, which runs counter-clockwise.
     turn = dot(cross(face_normals[:, None], face_normals.take(after, axis=0)), edges)[..., 0]
-    bent = (dihedrals > _LEAST) & (dihedrals < _MOST) & (after >= 0)
+    bent = (dihedrals > LEAST) & (dihedrals < _MOST) & (after >= 0)
     mixed = _any(bent & (turn > 0.0)) & _any(bent & (turn < 0.0))
     if not mixed.any():
         return np.zeros(len(corners))
@@ -78,8 +78,8 @@ def noise(
     seen = np.stack([mixed, own, tilt, between, size], axis=1)
     rings = _Rings(area, topology)
     share, own, tilt, between, size = rings.means(seen).T
-    tilted = np.minimum(own, tilt / np.maximum(between, 1e-9)) * (between > np.radians(_LEAST))
-    surely = (share > _MIXED) & (tilted > _TILTED)
+    tilted = np.minimum(own, tilt / np.maximum(between, 1e-9)) * (between > np.radians(LEAST))
+    surely = (share > _MIXED) & (tilted > TILTED)
     if not surely.any():
         return np.zeros(len(corners))
     likely = (share > _LESS_MIXED) & (tilted > _LESS_TILTED)

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 CREASE = 25.0
 # At the tip of a cone the normal leans off each facet by more than this, degrees, and so many times
 # the angle between facets.
-_LEANING, _TIMES = 5.0, 2.0
+LEANING, TIMES = 5.0, 2.0
 # Nor do normals lean off their facets by more than this anywhere else but in noise, rad.
-_MOST_LEAN = np.radians(14.9)
+MOST_LEAN = np.radians(14.9)
 # However fine the mesh, points this near to it can be of the same surface, mm.
 LEAST_REACH = 0.3
 
@@ -77,13 +77,17 @@ class MeshShape:
             joined &= ~self._ends(apart)
             over = noisy[:, None] | joined[self.F]
             normals = np.where(over[..., None], among[self.F], normals)
+        return self._leaning_back(normals)
+
+    def _leaning_back(self, normals: Floats) -> Floats:
+        """Normals (m, 3, 3) of length 1, those of facets where they lean off these too far."""
         normals = unit(normals)
         flat = self.face_normals[:, None]
         normals = np.where(self._tips(normals)[..., None], flat, normals)
         # The rest of what leans too far is brought back: facets too coarse to tell the surface.
         cosine = dot(normals, flat)
-        leaning = (cosine < np.cos(_MOST_LEAN)) & (self.noise == 0.0)[:, None, None]
-        back = np.cos(_MOST_LEAN) * flat + np.sin(_MOST_LEAN) * across(normals, flat)
+        leaning = (cosine < np.cos(MOST_LEAN)) & (self.noise == 0.0)[:, None, None]
+        back = np.cos(MOST_LEAN) * flat + np.sin(MOST_LEAN) * across(normals, flat)
         return np.where(leaning, back, normals)
 
     def _tips(self, normals: Floats) -> Booleans:
@@ -94,7 +98,7 @@ class MeshShape:
         cosine = dot(normals, self.face_normals[:, None])[..., 0]
         lean = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
         bent = np.maximum(self.dihedrals, np.roll(self.dihedrals, 1, axis=1))
-        return np.asarray((lean > _LEANING + _TIMES * bent) & (self.noise == 0.0)[:, None])
+        return np.asarray((lean > LEANING + TIMES * bent) & (self.noise == 0.0)[:, None])
 
     def _ends(self, edges: Booleans) -> Booleans:
         """Vertices, shape (n,), at the ends of edges marked (m, 3)."""

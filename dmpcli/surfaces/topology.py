@@ -151,10 +151,12 @@ class Topology:
         part = self.components[face]
         # Each edge leads away from its start as often as another comes back to it.
         way = np.where(place[:, 0] < place[:, 1], 1, -1)
-        keys = np.column_stack([part, np.sort(place, axis=1)])
-        groups, of = np.unique(keys, axis=0, return_inverse=True)
-        left = np.bincount(of.reshape(-1), way, len(groups))
-        closed[groups[left != 0, 0]] = False
+        # One number for each: several times as fast as rows of three.
+        span = int(place.max()) + 1
+        keys = (part * span + place.min(axis=1)) * span + place.max(axis=1)
+        groups, of = np.unique(keys, return_inverse=True)
+        left = np.bincount(of, way, len(groups))
+        closed[groups[left != 0] // span**2] = False
         return closed
 
 

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 _FEW = 8
 """So few closest points are remembered, of so many questions."""
 
+_FEW_PLANES = 0.1
+"""Planes of so many of the facets are found one by one, mostly."""
+
 _AFTER, _BEFORE = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Corners of a face: the one after each, and the one before it; np.roll takes ten times as long."""
 
@@ -68,8 +71,11 @@ class TriangleMesh:
     def _compiled_twin(self) -> Self:
         twin = type(self)(self.V, self.F)
         vars(twin).update(vars(self))
-        vars(twin).pop("_recent", None)  # found by other means
+        for found in ("_recent", "shape", "_local", "_known_maps"):  # by other means
+            vars(twin).pop(found, None)
         twin.compiled = True
+        if "_local" in vars(self):
+            vars(twin)["_local"] = self._local.beside(twin.shape)
         return twin
 
     @property
@@ -138,7 +144,8 @@ class TriangleMesh:
             return False
         near = np.zeros(len(self.V), dtype=bool)
         near[self.F[asked]] = True
-        self._local.about(np.flatnonzero(near[self.F].any(axis=1)))
+        a, b, c = near.take(self.F).T
+        self._local.about(np.flatnonzero(a | b | c))
         self._tell_kernels(self.for_kernels)
         return True
 
@@ -149,7 +156,11 @@ class TriangleMesh:
     @cached_property
     def shape(self) -> MeshShape:
         """Normals, creases and noise of all its faces; of few ask `noise_at` and its like."""
-        return MeshShape(self.V, self.F, self.topology)
+        if not self.compiled:
+            return MeshShape(self.V, self.F, self.topology)
+        from dmpcli.surfaces.compiled_shape import CompiledShape
+
+        return CompiledShape(self.V, self.F, self.topology)
 
     @cached_property
     def _local(self) -> LocalShape:
@@ -196,7 +207,11 @@ class TriangleMesh:
     def planes_at(self, face: Integers) -> Floats:
         """Unit normals of facets and their distances from the origin, shape (..., 4)."""
         if self.compiled:
-            return self._planes.take(face, axis=0)
+            # Many strokes ask for each, again and again; few, for few of them.
+            if "_planes" in vars(self) or face.size > _FEW_PLANES * len(self.F):
+                return self._planes.take(face, axis=0)
+            normal = self.face_normals.take(face, axis=0)
+            return np.concatenate([normal, dot(normal, self.corners[face, 0])], axis=-1)
         a, b, c = np.moveaxis(self.V[self.F[face]], -2, 0)
         normal = unit(cross(b - a, c - a))
         return np.concatenate([normal, dot(normal, a)], axis=-1)

@@ -16,7 +16,7 @@ from dmpcli.arrays import Floats
 from dmpcli.batch.site import PairSites, PreparedSite, Remark, Site, SiteFile
 from dmpcli.batch.task import Task
 from dmpcli.dmp.copies import ends
-from dmpcli.dmp.drawn_strokes import OnBorder
+from dmpcli.dmp.drawn_strokes import GeneralizeOptions, OnBorder
 from dmpcli.dmp.feasibility import admit, snapped
 from dmpcli.dmp.rollout import Pairs
 from dmpcli.dmp.sides import turned_over
@@ -38,6 +38,7 @@ from dmpcli.spatial.output_events import asked
 from dmpcli.spatial.pose import Pose
 from dmpcli.surfaces.mesh import Mesh
 from dmpcli.surfaces.plane import Plane
+from dmpcli.surfaces.surface import Surface
 from dmpcli.workflows import process
 from dmpcli.workflows.generalize import (
     Order,
@@ -305,6 +306,18 @@ class SiteWork:
         """The skill that is drawn, one for all sites: what it has found once it knows."""
         return self.skill.plain()
 
+    @cached_property
+    def _styles(self) -> dict[float, GeneralizeOptions]:
+        return {}
+
+    def _style(self, given: Surface, offset: float) -> GeneralizeOptions:
+        """How strokes are drawn over a surface: of one offset, over one as over another."""
+        if offset not in self._styles:
+            settings = self.settings
+            style = style_of(settings.style(), self.skill, given, settings.contact, offset)
+            self._styles[offset] = style
+        return self._styles[offset]
+
     def __call__(
         self, site: Site, ids: list[str], pairs: Pairs, duration: Floats
     ) -> tuple[PreparedSite, list[Remark]]:
@@ -330,7 +343,7 @@ class SiteWork:
             if settings.compiled and isinstance(surface, Mesh):
                 surface = surface.with_kernels
             given = facing_tool(surface, skill, table, name)
-            style = style_of(settings.style(), skill, given, settings.contact, site.offset)
+            style = self._style(given, site.offset)
             style = process.process_style(style, settings, self.on_border, given, self.keep_out, [])
             tell_of_surface(skill, style, given, table, name)
             verdict = admit(skill, table.pairs, duration, style, given, settings.snap_tol)

@@ -3,6 +3,7 @@
 import errno
 import os
 import stat
+from pathlib import Path
 
 import pytest
 
@@ -166,3 +167,10 @@ def test_a_part_of_a_batch_is_one_of_its_folder(name, tmp_path):
     with pytest.raises(InputError, match="names the part"):
         file_io.part_in(tmp_path, name, "pairs.parquet")
     assert file_io.part_in(tmp_path, "part-00012.parquet", "") == tmp_path / "part-00012.parquet"
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="a file that tells no size")
+def test_a_file_that_is_longer_than_it_tells_is_read_to_its_end():
+    """As what the kernel tells of itself is, and a log that somebody writes."""
+    assert Path("/proc/self/status").stat().st_size == 0
+    assert b"\nThreads:" in file_io.read("/proc/self/status").content

@@ -1,6 +1,7 @@
 """Kernels beside numpy: the same strokes but for rounding, and the same refusals."""
 
 import gc
+import itertools
 import weakref
 
 import numpy as np
@@ -11,7 +12,7 @@ from dmpcli.spatial import rotations
 from dmpcli.surfaces import frame_smoothing
 from dmpcli.surfaces.mesh import Mesh
 from tests.extras_here import needs
-from tests.surfaces import cases, fields, zoo
+from tests.surfaces import cases, fields, test_local_shape, zoo
 from tests.surfaces.judge import Judge, traced
 from tests.surfaces.test_borders import patch_with_hole, roll, unrolled_strokes
 from tests.surfaces.test_slits import plate_with_fin
@@ -237,12 +238,47 @@ def test_a_mesh_with_kernels_is_let_go_of_when_nobody_holds_it():
         gc.enable()
 
 
-def test_boxes_in_single_precision_hold_those_in_double():
-    from dmpcli.surfaces.kernels.mesh import _outwards
+def test_boxes_of_the_search_tree_hold_their_facets_and_little_more():
+    mesh = region(np.zeros(3))[0].with_kernels
+    facets = mesh.facets
+    leaves = len(facets.first) - 1
+    assert facets.boxes.dtype == np.float32
+    corners = mesh.corners[mesh.tree_order.order]
+    held = [corners[a:b].reshape(-1, 3) for a, b in itertools.pairwise(facets.first)]
+    inner = {leaf + leaves - 1: at for leaf, at in enumerate(held)}
+    for node in range(leaves - 2, -1, -1):
+        inner[node] = np.concatenate([inner[2 * node + 1], inner[2 * node + 2]])
+    low = np.array([inner[node].min(axis=0) for node in range(len(facets.boxes))])
+    high = np.array([inner[node].max(axis=0) for node in range(len(facets.boxes))])
+    assert (facets.boxes[:, :3].astype(float) <= low).all()
+    assert (facets.boxes[:, 3:].astype(float) >= high).all()
+    np.testing.assert_allclose(facets.boxes, np.hstack([low, high]), rtol=3e-7, atol=1e-30)
 
-    boxes = np.random.default_rng(3).uniform(-900.0, 900.0, (200, 6))
-    found = _outwards(boxes)
-    assert found.dtype == np.float32
-    assert (found[:, :3].astype(float) <= boxes[:, :3]).all()
-    assert (found[:, 3:].astype(float) >= boxes[:, 3:]).all()
-    np.testing.assert_allclose(found, boxes, rtol=3e-7)
+
+SHAPES = ("face_normals", "dihedrals", "vertex_normals", "corner_normals", "noise", "heights")
+PARTS = {**test_local_shape.MESHES, "plate with a fin": lambda: plate_with_fin(2, 6)[0]}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_the_shape_that_kernels_find_is_the_one_without_them(name):
+    """With creases, tips, slivers, borders, edges of three faces, and noise on a half of it."""
+    mesh = PARTS[name]()
+    plain, compiled = mesh.shape, mesh.with_kernels.shape
+    assert type(plain) is not type(compiled)
+    for what in (*SHAPES, "reach"):
+        found, wanted = getattr(compiled, what), getattr(plain, what)
+        np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-15, err_msg=what)
+    assert ("rough" in name) == bool(compiled.noise.any())
+
+
+@pytest.mark.parametrize("tilt", [10.0, 40.0])
+def test_tips_of_cones_and_facets_that_normals_lean_off_are_so_with_kernels_too(tilt):
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
+    V = np.vstack([rim, [[0.0, 0.0, np.tan(np.radians(tilt))]]])
+    mesh = Mesh(V, np.column_stack([np.arange(12), (np.arange(12) + 1) % 12, np.full(12, 12)]))
+    plain, compiled = mesh.shape.corner_normals, mesh.with_kernels.shape.corner_normals
+    np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-15)
+    # At the tip the facets' own: an axis leans off them by the cone's angle.
+    lean = np.degrees(np.arccos(compiled[:, 2, 2]))
+    np.testing.assert_allclose(lean, np.degrees(np.arccos(mesh.face_normals[:, 2])), atol=15.0)

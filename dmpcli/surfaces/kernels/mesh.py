@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
+from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.surfaces.kernels import tree
 from dmpcli.surfaces.kernels.tree import Facets
 from dmpcli.surfaces.kernels.tree_order import TreeOrder, boxes_of
@@ -58,7 +58,7 @@ class Compiled:
         )
         tree.fill(reals, numbers, faces, order, self.rows.astype(np.int32))
         self._lying = _on_one_another(mesh.vertices)
-        self.facets = Facets(_outwards(boxes_of(reals, first)), first, reals, numbers)
+        self.facets = Facets(boxes_of(reals, first), first, reals, numbers)
 
     def asked(self) -> Integers:
         """Faces whose shape kernels have asked for and not found."""
@@ -81,19 +81,10 @@ class Compiled:
         """
         rows = self.rows[faces]
         at = self.facets.numbers[rows, tree.VERTICES : tree.VERTICES + 3]
-        apart = _split(at, normals, len(self._lying))
-        split = np.any(apart[at] | self._lying[at], axis=1)
+        split = tree.split(at, normals, self._lying)
         new = np.flatnonzero(inner & (self.facets.reals[rows, tree.REACH] < 0.0))
         tree.shape(self.facets, rows[new], normals[new], reach[new], split[new])
         self.unknown -= len(new)
-
-
-def _split(at: Halves, normals: Floats, count: int) -> Booleans:
-    """Vertices, of so many, about which facets (k, 3) have normals of their own."""
-    one, split = np.zeros((count, 3)), np.zeros(count, dtype=bool)
-    one[at] = normals
-    split[at[(np.abs(normals - one[at]) > 1e-12).any(axis=-1)]] = True
-    return split
 
 
 def _on_one_another(points: Floats) -> Booleans:
@@ -105,11 +96,3 @@ def _on_one_another(points: Floats) -> Booleans:
     same = np.diff(number[order]) <= 1e-9 * max(1.0, float(np.abs(number).max(initial=0.0)))
     lying[order[1:][same]] = lying[order[:-1][same]] = True
     return lying
-
-
-def _outwards(boxes: Floats) -> Singles:
-    """Boxes in single precision that hold these."""
-    rounded = boxes.astype(np.float32)
-    for corner, way in ((slice(3), -np.inf), (slice(3, 6), np.inf)):
-        rounded[:, corner] = np.nextafter(rounded[:, corner], np.float32(way))
-    return rounded

@@ -8,6 +8,7 @@ from dmpcli.surfaces.kernels import (
     checks,
     facet_walks,
     samples,
+    shape,
     smoothing,
     stepping,
     tree,
@@ -20,6 +21,7 @@ _ENTRIES = (
     tree_order.boxes_of,
     tree.fill,
     tree.shape,
+    tree.split,
     tree.search,
     stepping.start,
     stepping.ends,
@@ -29,6 +31,13 @@ _ENTRIES = (
     facet_walks.run,
     smoothing.smoothed,
     euler_of_products,
+    shape.face_normals,
+    shape.dihedrals,
+    shape.tilted,
+    shape.leaning_back,
+    shape.leans,
+    shape.heights,
+    shape.reach,
 )
 
 
@@ -57,6 +66,13 @@ def load() -> None:
     normals = np.repeat(n[:, None], 3, axis=1)
     known.learn(np.arange(2), normals, np.ones(2), np.ones(2, dtype=bool))
     facets = known.facets
+    facing, means = shape.face_normals(corners), np.tile(n[:1], (4, 1))
+    angles = shape.dihedrals(facing, neighbours)
+    shape.tilted(facing, means, faces, angles, 0.0, 0.6)
+    shape.leaning_back(normals, facing, angles, np.zeros(2), 5.0, 2.0, 0.3)
+    shape.leans(means, faces, facing, 0.9)
+    high = shape.heights(corners, means, faces, neighbours, angles, 0.5)
+    shape.reach(faces, high, np.zeros(2), 4, 0.3)
     v, one, number, mark = np.empty((0, 3)), np.empty((0, 1)), np.empty(0, np.int64), none[:0, 0]
     tree.search(facets, v)
     walks = stepping.Walks(v, v, v, v, one, one, number, v, one[:, 0])

@@ -10,7 +10,18 @@ import numpy as np
 
 from dmpcli.arrays import Booleans, Floats, Halves, Integers, Singles
 from dmpcli.compiled import kernel
-from dmpcli.surfaces.kernels.vectors import Vector, add, cross, dot, length, sub, times, unit
+from dmpcli.surfaces.kernels.vectors import (
+    Vector,
+    add,
+    at,
+    cross,
+    dot,
+    length,
+    put,
+    sub,
+    times,
+    unit,
+)
 
 SPLIT = 64
 _ON = 1e-9
@@ -97,6 +108,27 @@ def fill(reals: Floats, numbers: Halves, faces: FaceArrays, order: Halves, rows:
             flags |= (1 << k) if across == -1 else 0
             flags |= (8 << k) if faces.border[vertex] else 0
         numbers[i, FLAGS], numbers[i, PART], numbers[i, FACE] = flags, faces.part[face], face
+
+
+@kernel
+def split(vertices: Halves, normals: Floats, lying: Booleans) -> Booleans:
+    """Facets (k,), with vertices (k, 3), at which there are others with normals of their own.
+
+    Or other vertices, which are `lying` (n,) where they are. Normals (k, 3, 3) are of corners.
+    """
+    one = np.empty((len(lying), 3))
+    apart, found = lying.copy(), np.empty(len(vertices), dtype=np.bool_)
+    for i in range(len(vertices)):
+        for k in range(3):
+            put(one, vertices[i, k], at(normals[i], k))
+    for i in range(len(vertices)):
+        for k in range(3):
+            for c in range(3):
+                if abs(normals[i, k, c] - one[vertices[i, k], c]) > 1e-12:
+                    apart[vertices[i, k]] = True
+    for i in range(len(vertices)):
+        found[i] = apart[vertices[i, 0]] or apart[vertices[i, 1]] or apart[vertices[i, 2]]
+    return found
 
 
 @kernel

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Halves
+from dmpcli.arrays import Floats, Halves, Singles
 from dmpcli.compiled import kernel
 
 _LEAF = 4
@@ -93,17 +93,19 @@ class TreeOrder(NamedTuple):
 
 
 @kernel
-def boxes_of(reals: Floats, first: Halves) -> Floats:
-    """Boxes of all nodes."""
+def boxes_of(reals: Floats, first: Halves) -> Singles:
+    """Boxes of all nodes, rounded outwards to single precision."""
     leaves = len(first) - 1
-    boxes = np.empty((2 * leaves - 1, 6))
+    boxes = np.empty((2 * leaves - 1, 6), dtype=np.float32)
     for leaf in range(leaves):
         box = boxes[leaves - 1 + leaf]
-        box[:3], box[3:] = np.inf, -np.inf
-        for i in range(first[leaf], first[leaf + 1]):
-            for c in range(9):
-                box[c % 3] = min(box[c % 3], reals[i, c])
-                box[3 + c % 3] = max(box[3 + c % 3], reals[i, c])
+        for k in range(3):
+            least, most = np.inf, -np.inf
+            for i in range(first[leaf], first[leaf + 1]):
+                a, b, c = reals[i, k], reals[i, 3 + k], reals[i, 6 + k]
+                least, most = min(least, a, b, c), max(most, a, b, c)
+            box[k] = np.nextafter(np.float32(least), np.float32(-np.inf))
+            box[3 + k] = np.nextafter(np.float32(most), np.float32(np.inf))
     for node in range(leaves - 2, -1, -1):
         for k in range(3):
             boxes[node, k] = min(boxes[2 * node + 1, k], boxes[2 * node + 2, k])
