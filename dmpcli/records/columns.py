@@ -63,7 +63,9 @@ def columns_of(
 
 def _array(chunked: Any, key: str, column: Column, name: str, views: bool) -> AnyArray:
     try:
-        values = chunked.cast(TYPES[column.type]).combine_chunks()
+        cast = chunked.cast(TYPES[column.type])
+        # One chunk would be copied.
+        values = cast.chunk(0) if cast.num_chunks == 1 else cast.combine_chunks()
     except pa.ArrowException:
         raise InputError(
             f"{name}: column {key!r} holds {chunked.type}, numbers are needed"

@@ -408,39 +408,75 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
     wanted = {n: named[n] for n in ("t", "x", "y", "z", *columns)}
     chosen = ["id", *(n for n in wanted if n in known)]
     expected = batch.ids.take(pa.array(rows))
-    done, offset, groups = 0, 0, part.metadata.num_row_groups
-    size = (batch.folder / file).stat().st_size
-    carried: dict[str, AnyArray] = {}
-    waiting: str | None = None
-    for group in range(groups):
-        parquet.judge(name, part, size, [group])
-        try:
-            with untrusted.decoding(name, f"row group {group + 1}"):
-                table = part.read_row_group(group, columns=chosen)
-        except InputError:
-            raise InputError(f"{name}: is damaged inside; draw the batch again") from None
+    done, offset = 0, 0
+
+    def piece(held: _Held) -> Iterator[Piece]:
+        nonlocal done, offset
+        ids, first, found = held
+        _same(name, ids, expected, done)
+        if len(ids):
+            some = rows[done : done + len(ids)]
+            made = Piece(name, provenance.facts, some, first, found)
+            _check_normals(made, batch, offset)
+            yield made
+            offset += int(first[-1])
+        done += len(ids)
+
+    # Trajectories mostly have one length: then none goes on in the next table.
+    each = max(1, part.metadata.num_rows // max(1, len(rows)))
+    at_once = max(1, _ROWS // each) * each
+    held: _Held | None = None
+    for group, table in _tables(part, name, (batch.folder / file).stat().st_size, chosen, at_once):
         with untrusted.decoding(name, f"row group {group + 1}"):
             found = columns_of(table, wanted, name, views=True)
             ids, first = _runs(table.column("id"), name)
-        del table
-        if waiting is not None:
-            before = len(next(iter(carried.values())))
-            found = {n: np.concatenate([carried[n], c]) for n, c in found.items()}
-            again = ids[0] == waiting
-            ids = ids if again else [waiting, *ids]
-            first = np.concatenate([[0], (first + before)[1 if again else 0 :]])
-            waiting = None
-        if group < groups - 1:
-            waiting, last = ids[-1], int(first[-2])
-            carried = {n: c[last:] for n, c in found.items()}
-            ids, first = ids[:-1], first[:-1]
-        _same(name, ids, expected, done)
-        if len(ids):
-            piece = Piece(name, provenance.facts, rows[done : done + len(ids)], first, found)
-            _check_normals(piece, batch, offset)
-            yield piece
-            offset += int(first[-1])
-        done += len(ids)
+        if held is not None:
+            before, (ids, first, found) = _divided(held, (ids, first, found))
+            yield from piece(before)
+        held = ids, first, found
+        del table, found
+    if held is not None:
+        yield from piece(held)
+
+
+_Held = tuple[list[str], Integers, dict[str, AnyArray]]
+"""Ids of trajectories, where each begins, with the end, and their samples."""
+
+_ROWS = 3 << 16
+"""Samples read at once."""
+
+
+def _tables(
+    part: Any, name: str, size: int, columns: list[str], at_once: int
+) -> Iterator[tuple[int, Any]]:
+    """Tables of so many rows of an open part, with the row group that each comes from."""
+    for group in range(part.metadata.num_row_groups):
+        parquet.judge(name, part, size, [group])
+        some = part.iter_batches(at_once, row_groups=[group], columns=columns, use_threads=False)
+        while True:
+            try:
+                with untrusted.decoding(name, f"row group {group + 1}"):
+                    rows = next(some, None)
+            except InputError:
+                raise InputError(f"{name}: is damaged inside; draw the batch again") from None
+            if rows is None:
+                break
+            if rows.num_rows:
+                yield group, pa.Table.from_batches([rows])
+
+
+def _divided(one: _Held, other: _Held) -> tuple[_Held, _Held]:
+    """Move a trajectory that begins in one table and goes on in the next to the latter."""
+    if one[0][-1] != other[0][0]:
+        return one, other
+    (ids, first, found), last = one, int(one[1][-2])
+    whole = {n: np.concatenate([found[n][last:], c]) for n, c in other[2].items()}
+    begin = np.concatenate([[0], other[1][1:] + (int(first[-1]) - last)])
+    return (ids[:-1], first[:-1], {n: c[:last] for n, c in found.items()}), (
+        other[0],
+        begin,
+        whole,
+    )
 
 
 def _check_normals(piece: Piece, batch: BatchFolder, offset: int) -> None:

@@ -120,8 +120,8 @@ def _blocks(
             size = max(1, (_BY_KERNELS if sight.compiled else _SAMPLES) // len(t))
             size = min(size, AT_ONCE) if curved else size
             for number, those in _apart(batch, piece, which, sight):
-                for first in range(0, len(those), size):
-                    some = those[first : first + size]
+                count = max(1, round(len(those) / size))
+                for some in np.array_split(those, count) if len(those) else ():
                     yield course, (batch, piece, some, t, label, sight, number)
 
 
