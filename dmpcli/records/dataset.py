@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
-from dmpcli.records.columns import check_ids, columns_of
+from dmpcli.records.columns import check_ids, columns_of, nulls, numbers, taken, viewed
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
@@ -127,7 +127,7 @@ def part_of(batch: BatchFolder, part: int, rows: Integers) -> BatchFolder:
 
     return replace(
         batch,
-        ids=batch.ids.take(pa.array(rows)),
+        ids=taken(batch.ids, rows),
         part=np.zeros(len(rows), dtype=np.int64),
         start=own(batch.start),
         goal=own(batch.goal),
@@ -212,7 +212,7 @@ def _decoded(folder: Location, source: Source) -> BatchFolder:
         folder,
         source.sha256,
         provenance,
-        ids if every else ids.take(pa.array(drawn)),
+        ids if every else taken(ids, drawn),
         part,
         numbers.get(0),
         numbers.get(1),
@@ -234,7 +234,9 @@ def _parts(words: Any) -> tuple[Integers, list[str]]:
     place = {name: i for i, name in enumerate(files)}
     # Code -1, no value, takes the last one.
     places = np.array([*(place.get(name, -1) for name in names), -1])
-    return places[np.asarray(encoded.indices.fill_null(-1))], files
+    code = numbers(encoded.indices)  # fill_null would import pandas
+    code[nulls(encoded.indices)] = -1
+    return places[code], files
 
 
 def _text(table: Any, name: str, column: Column, file: str) -> Any:
@@ -407,7 +409,7 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
     named = schemas.TRAJECTORY.columns
     wanted = {n: named[n] for n in ("t", "x", "y", "z", *columns)}
     chosen = ["id", *(n for n in wanted if n in known)]
-    expected = batch.ids.take(pa.array(rows))
+    expected = taken(batch.ids, rows)
     done, offset = 0, 0
 
     def piece(held: _Held) -> Iterator[Piece]:
@@ -507,9 +509,9 @@ def _runs(column: Any, name: str) -> tuple[list[str], Integers]:
     )
     if not pa.types.is_dictionary(words.type):
         words = words.dictionary_encode()
-    code = np.asarray(words.indices)
+    code = viewed(words.indices)  # asarray would import pandas
     first = np.concatenate([[0], np.flatnonzero(code[1:] != code[:-1]) + 1, [len(code)]])
-    ids = words.dictionary.take(pa.array(code[first[:-1]])).cast(pa.string()).to_pylist()
+    ids = taken(words.dictionary, code[first[:-1]]).cast(pa.string()).to_pylist()
     return ids, first.astype(np.int64)
 
 
@@ -542,7 +544,7 @@ def states_of(batch: BatchFolder) -> tuple[dict[str, int], list[dict[str, Any]]]
     far = r"^(?:start|goal|start or goal) lies [0-9.]+(?: and [a-z]+ [0-9.]+)? mm off ([^;]*).*$"
     reason = pc.replace_substring_regex(reason, far, r"start or goal lies off \1")
     words = reason.dictionary_encode()
-    code = np.asarray(words.indices)
+    code = viewed(words.indices)  # asarray would import pandas
     names = words.dictionary.to_pylist()
     counts = np.bincount(code, minlength=len(names))
     states = {name: int(n) for name, n in zip(names, counts, strict=True)}

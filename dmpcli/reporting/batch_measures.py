@@ -8,11 +8,11 @@ from functools import partial
 from threading import Event
 
 import numpy as np
-import pyarrow as pa
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import dataset, schemas
+from dmpcli.records.columns import taken
 from dmpcli.records.dataset import BatchFolder, Piece
 from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.report_surface import AT_ONCE
@@ -132,7 +132,7 @@ def _apart(
     if sight.grounds is None:
         yield None, which
         return
-    on = sight.grounds.of(batch.ids.take(pa.array(piece.rows[which])).to_pylist())
+    on = sight.grounds.of(taken(batch.ids, piece.rows[which]).to_pylist())
     for number in np.unique(on).tolist():
         yield number, which[on == number]
 

@@ -2,6 +2,8 @@
 
 import importlib.util
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -304,6 +306,18 @@ def test_what_is_measured_does_not_depend_on_how_much_is_read_at_once(
     found = strokes_of_rows(batch, "b", MeasurementContext(taught()), rows)
     assert [stroke.label for stroke in found.values()] == [f"b[{row + 1}]" for row in rows]
     assert [len(stroke.t) for stroke in found.values()] == [501, 501, 501, 400]
+
+
+def test_reading_a_batch_loads_no_pandas(tmp_path):
+    folder = put_batch(tmp_path / "b", [strokes(3, n=40)], failed=("nothing there",))
+    code = (
+        "import pathlib, sys; from dmpcli.records import dataset\n"
+        f"batch, _ = dataset.read(pathlib.Path({str(folder)!r}))\n"
+        "print(len(list(dataset.pieces(batch, ()))), len(dataset.states_of(batch)[1]))\n"
+        "print('pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert done.stdout.decode().splitlines() == ["1 1", "False"]
 
 
 def test_only_some_strokes_are_read_again(tmp_path):
