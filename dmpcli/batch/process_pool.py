@@ -6,7 +6,7 @@ It is begun as early as can be, and loads while the command reads its inputs.
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
@@ -17,9 +17,15 @@ T = TypeVar("T")
 _LOADED = ["dmpcli.cli", "dmpcli.batch.workers"]
 
 
-def begin() -> None:
-    """Begin to load; returns at once."""
-    context().set_forkserver_preload(_LOADED)
+def begin(more: Sequence[str] = ()) -> None:
+    """Begin to load; returns at once.
+
+    Parameters
+    ----------
+    more : sequence of str
+        Modules beside those that drawing needs; one that cannot be imported is left out.
+    """
+    context().set_forkserver_preload([*_LOADED, *more])
     # What is ignored stays so in a new process: Ctrl-C is this one's affair.
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

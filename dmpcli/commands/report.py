@@ -12,6 +12,9 @@ from dmpcli.settings.options import with_options
 from dmpcli.settings.recording import RecordingOptions
 from dmpcli.settings.report import ReportOptions
 
+_LOADED, _KERNELS = ["dmpcli.workflows.report_jobs"], "dmpcli.workflows.kept_kernels"
+"""What processes that measure need."""
+
 
 @with_options
 def command(
@@ -72,6 +75,10 @@ def command(
 ) -> None:
     """Compare strokes: wave heights, deviation, smoothness, ends, deadlines."""
     on_terminal(quiet)
+    if wanted.jobs > 1:
+        from dmpcli.batch import process_pool
+
+        process_pool.begin(_LOADED if wanted.kernels == "pure" else [*_LOADED, _KERNELS])
     from dmpcli.records import file_io
     from dmpcli.records.storage import located
     from dmpcli.workflows import surface_input
@@ -94,10 +101,6 @@ def command(
         from dmpcli.reporting.turnable import check
 
         check()
-    if wanted.jobs > 1:
-        from dmpcli.batch import process_pool
-
-        process_pool.begin()
     layout = form.as_layout()
     read = grounds = None
     if pairs_at is not None:

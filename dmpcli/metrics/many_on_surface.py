@@ -20,6 +20,9 @@ _REACH = 8
 _AT_ONCE = 1 << 18
 """Pairs of point and sample worked on at once."""
 
+_LEVEL = 1e-12
+"""Heights that differ by no more than this differ by rounding alone, mm."""
+
 
 class TaughtHeights:
     """Heights of a demonstration at the places of strokes; see `on_surface.height_there`.
@@ -74,7 +77,7 @@ class TaughtHeights:
             Of u.
         """
         w = self.place[:, 2]
-        if np.all(w == w[0]):
+        if np.ptp(w) <= _LEVEL:
             return np.full(uv.shape[1:], w[0])
         if self.compiled:
             from dmpcli.metrics.kernels import polyline

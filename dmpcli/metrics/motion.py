@@ -212,7 +212,7 @@ def _sparc_of(
     rows = np.flatnonzero((largest > 0.0) & few)
     if len(rows):
         count = min(int(needed[rows].max()) + 1, lines)
-        wide, some = -(-count // 32) * 32, speed[rows]
+        wide, some = -(-count // 32) * 32, speed if len(rows) == len(speed) else speed[rows]
         if folded:
             result[rows] = _folded_arc(some, size, wide, count, largest[rows])
         else:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from dmpcli.arrays import AnyArray, Booleans
+from dmpcli.arrays import AnyArray, Booleans, Integers
 from dmpcli.errors import InputError
 from dmpcli.records.schemas import Column
 
@@ -63,7 +63,9 @@ def columns_of(
 
 def _array(chunked: Any, key: str, column: Column, name: str, views: bool) -> AnyArray:
     try:
-        values = chunked.cast(TYPES[column.type]).combine_chunks()
+        cast = chunked.cast(TYPES[column.type])
+        # One chunk would be copied.
+        values = cast.chunk(0) if cast.num_chunks == 1 else cast.combine_chunks()
     except pa.ArrowException:
         raise InputError(
             f"{name}: column {key!r} holds {chunked.type}, numbers are needed"
@@ -71,7 +73,7 @@ def _array(chunked: Any, key: str, column: Column, name: str, views: bool) -> An
             else f"{name}: column {key!r} holds {chunked.type}, text is needed"
         ) from None
     whole = column.type == "double" and values.null_count == 0
-    if whole and all_within(seen := _seen(values), LARGEST):
+    if whole and all_within(seen := viewed(values), LARGEST):
         return seen if views else seen.copy()
     unknown = nulls(values)
     if column.required and unknown.any():
@@ -142,12 +144,19 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
     return np.dtype(f"{letter}{kind.bit_width // 8}")
 
 
+def taken(values: Any, rows: Integers) -> Any:
+    """Return values of a pyarrow array by their rows (k,)."""
+    index = np.ascontiguousarray(rows, dtype=np.int64)
+    # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
+    return values.take(pa.Array.from_buffers(pa.int64(), len(index), [None, pa.py_buffer(index)]))
+
+
 def numbers(values: Any) -> AnyArray:
     """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
-    return _seen(values).copy()
+    return viewed(values).copy()
 
 
-def _seen(values: Any) -> AnyArray:
+def viewed(values: Any) -> AnyArray:
     """Numbers of a pyarrow array where they lie."""
     dtype = dtype_of(values.type)
     if len(values) == 0:

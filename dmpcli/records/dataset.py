@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from dmpcli.arrays import AnyArray, Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, manifest, parquet, record, schemas, untrusted
-from dmpcli.records.columns import check_ids, columns_of
+from dmpcli.records.columns import check_ids, columns_of, nulls, numbers, taken, viewed
 from dmpcli.records.file_io import Source
 from dmpcli.records.pairs import GOAL, START
 from dmpcli.records.record import Provenance
@@ -127,7 +127,7 @@ def part_of(batch: BatchFolder, part: int, rows: Integers) -> BatchFolder:
 
     return replace(
         batch,
-        ids=batch.ids.take(pa.array(rows)),
+        ids=taken(batch.ids, rows),
         part=np.zeros(len(rows), dtype=np.int64),
         start=own(batch.start),
         goal=own(batch.goal),
@@ -212,7 +212,7 @@ def _decoded(folder: Location, source: Source) -> BatchFolder:
         folder,
         source.sha256,
         provenance,
-        ids if every else ids.take(pa.array(drawn)),
+        ids if every else taken(ids, drawn),
         part,
         numbers.get(0),
         numbers.get(1),
@@ -234,7 +234,9 @@ def _parts(words: Any) -> tuple[Integers, list[str]]:
     place = {name: i for i, name in enumerate(files)}
     # Code -1, no value, takes the last one.
     places = np.array([*(place.get(name, -1) for name in names), -1])
-    return places[np.asarray(encoded.indices.fill_null(-1))], files
+    code = numbers(encoded.indices)  # fill_null would import pandas
+    code[nulls(encoded.indices)] = -1
+    return places[code], files
 
 
 def _text(table: Any, name: str, column: Column, file: str) -> Any:
@@ -407,40 +409,76 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
     named = schemas.TRAJECTORY.columns
     wanted = {n: named[n] for n in ("t", "x", "y", "z", *columns)}
     chosen = ["id", *(n for n in wanted if n in known)]
-    expected = batch.ids.take(pa.array(rows))
-    done, offset, groups = 0, 0, part.metadata.num_row_groups
-    size = (batch.folder / file).stat().st_size
-    carried: dict[str, AnyArray] = {}
-    waiting: str | None = None
-    for group in range(groups):
-        parquet.judge(name, part, size, [group])
-        try:
-            with untrusted.decoding(name, f"row group {group + 1}"):
-                table = part.read_row_group(group, columns=chosen)
-        except InputError:
-            raise InputError(f"{name}: is damaged inside; draw the batch again") from None
+    expected = taken(batch.ids, rows)
+    done, offset = 0, 0
+
+    def piece(held: _Held) -> Iterator[Piece]:
+        nonlocal done, offset
+        ids, first, found = held
+        _same(name, ids, expected, done)
+        if len(ids):
+            some = rows[done : done + len(ids)]
+            made = Piece(name, provenance.facts, some, first, found)
+            _check_normals(made, batch, offset)
+            yield made
+            offset += int(first[-1])
+        done += len(ids)
+
+    # Trajectories mostly have one length: then none goes on in the next table.
+    each = max(1, part.metadata.num_rows // max(1, len(rows)))
+    at_once = max(1, _ROWS // each) * each
+    held: _Held | None = None
+    for group, table in _tables(part, name, (batch.folder / file).stat().st_size, chosen, at_once):
         with untrusted.decoding(name, f"row group {group + 1}"):
             found = columns_of(table, wanted, name, views=True)
             ids, first = _runs(table.column("id"), name)
-        del table
-        if waiting is not None:
-            before = len(next(iter(carried.values())))
-            found = {n: np.concatenate([carried[n], c]) for n, c in found.items()}
-            again = ids[0] == waiting
-            ids = ids if again else [waiting, *ids]
-            first = np.concatenate([[0], (first + before)[1 if again else 0 :]])
-            waiting = None
-        if group < groups - 1:
-            waiting, last = ids[-1], int(first[-2])
-            carried = {n: c[last:] for n, c in found.items()}
-            ids, first = ids[:-1], first[:-1]
-        _same(name, ids, expected, done)
-        if len(ids):
-            piece = Piece(name, provenance.facts, rows[done : done + len(ids)], first, found)
-            _check_normals(piece, batch, offset)
-            yield piece
-            offset += int(first[-1])
-        done += len(ids)
+        if held is not None:
+            before, (ids, first, found) = _divided(held, (ids, first, found))
+            yield from piece(before)
+        held = ids, first, found
+        del table, found
+    if held is not None:
+        yield from piece(held)
+
+
+_Held = tuple[list[str], Integers, dict[str, AnyArray]]
+"""Ids of trajectories, where each begins, with the end, and their samples."""
+
+_ROWS = 3 << 16
+"""Samples read at once."""
+
+
+def _tables(
+    part: Any, name: str, size: int, columns: list[str], at_once: int
+) -> Iterator[tuple[int, Any]]:
+    """Tables of so many rows of an open part, with the row group that each comes from."""
+    for group in range(part.metadata.num_row_groups):
+        parquet.judge(name, part, size, [group])
+        some = part.iter_batches(at_once, row_groups=[group], columns=columns, use_threads=False)
+        while True:
+            try:
+                with untrusted.decoding(name, f"row group {group + 1}"):
+                    rows = next(some, None)
+            except InputError:
+                raise InputError(f"{name}: is damaged inside; draw the batch again") from None
+            if rows is None:
+                break
+            if rows.num_rows:
+                yield group, pa.Table.from_batches([rows])
+
+
+def _divided(one: _Held, other: _Held) -> tuple[_Held, _Held]:
+    """Move a trajectory that begins in one table and goes on in the next to the latter."""
+    if one[0][-1] != other[0][0]:
+        return one, other
+    (ids, first, found), last = one, int(one[1][-2])
+    whole = {n: np.concatenate([found[n][last:], c]) for n, c in other[2].items()}
+    begin = np.concatenate([[0], other[1][1:] + (int(first[-1]) - last)])
+    return (ids[:-1], first[:-1], {n: c[:last] for n, c in found.items()}), (
+        other[0],
+        begin,
+        whole,
+    )
 
 
 def _check_normals(piece: Piece, batch: BatchFolder, offset: int) -> None:
@@ -471,9 +509,9 @@ def _runs(column: Any, name: str) -> tuple[list[str], Integers]:
     )
     if not pa.types.is_dictionary(words.type):
         words = words.dictionary_encode()
-    code = np.asarray(words.indices)
+    code = viewed(words.indices)  # asarray would import pandas
     first = np.concatenate([[0], np.flatnonzero(code[1:] != code[:-1]) + 1, [len(code)]])
-    ids = words.dictionary.take(pa.array(code[first[:-1]])).cast(pa.string()).to_pylist()
+    ids = taken(words.dictionary, code[first[:-1]]).cast(pa.string()).to_pylist()
     return ids, first.astype(np.int64)
 
 
@@ -506,7 +544,7 @@ def states_of(batch: BatchFolder) -> tuple[dict[str, int], list[dict[str, Any]]]
     far = r"^(?:start|goal|start or goal) lies [0-9.]+(?: and [a-z]+ [0-9.]+)? mm off ([^;]*).*$"
     reason = pc.replace_substring_regex(reason, far, r"start or goal lies off \1")
     words = reason.dictionary_encode()
-    code = np.asarray(words.indices)
+    code = viewed(words.indices)  # asarray would import pandas
     names = words.dictionary.to_pylist()
     counts = np.bincount(code, minlength=len(names))
     states = {name: int(n) for name, n in zip(names, counts, strict=True)}

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from typing import TextIO
 
 import numpy as np
-import pyarrow as pa
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.messages import Advance
 from dmpcli.metrics import paper_values
+from dmpcli.records.columns import taken
 from dmpcli.records.dataset import BatchFolder, facts_of, part_of, states_of
 from dmpcli.reporting.batch_measures import measured_parts, strokes_of_rows
 from dmpcli.reporting.figure_store import FigureStore
@@ -206,7 +206,7 @@ class Measurement:
         shown = dict(zip(some.rows[drawn].tolist(), some.strokes(drawn), strict=True))
         if not self.told:
             return MeasuredStrokes(some.rows, some.table, shown, "", "")
-        ids = batch.ids.take(pa.array(some.rows)).to_pylist()
+        ids = taken(batch.ids, some.rows).to_pylist()
         compiled = self.sight.compiled
         waves = _wave_rows(some, self.label, ids, compiled)
         strokes = _stroke_rows(some, self.label, ids, batch, compiled)

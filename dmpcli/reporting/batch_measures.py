@@ -8,11 +8,11 @@ from functools import partial
 from threading import Event
 
 import numpy as np
-import pyarrow as pa
 
 from dmpcli.arrays import Floats, Integers
 from dmpcli.errors import InputError
 from dmpcli.records import dataset, schemas
+from dmpcli.records.columns import taken
 from dmpcli.records.dataset import BatchFolder, Piece
 from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.report_surface import AT_ONCE
@@ -120,8 +120,8 @@ def _blocks(
             size = max(1, (_BY_KERNELS if sight.compiled else _SAMPLES) // len(t))
             size = min(size, AT_ONCE) if curved else size
             for number, those in _apart(batch, piece, which, sight):
-                for first in range(0, len(those), size):
-                    some = those[first : first + size]
+                count = max(1, round(len(those) / size))
+                for some in np.array_split(those, count) if len(those) else ():
                     yield course, (batch, piece, some, t, label, sight, number)
 
 
@@ -132,7 +132,7 @@ def _apart(
     if sight.grounds is None:
         yield None, which
         return
-    on = sight.grounds.of(batch.ids.take(pa.array(piece.rows[which])).to_pylist())
+    on = sight.grounds.of(taken(batch.ids, piece.rows[which]).to_pylist())
     for number in np.unique(on).tolist():
         yield number, which[on == number]
 

@@ -190,12 +190,8 @@ def _on_plane(
             lifts = taught.at(phase, uv if every else uv[:, charted], stretch)
             off = _spread(lifts, charted)
     lying.spreads(height, off, most, rms)
-    waves = many_waves(
-        np.where(charted[:, None], uv[1], 0.0),
-        np.where(charted, lengths, 1.0),
-        block.closed,
-        compiled=True,
-    )
+    across = uv[1] if charted.all() else np.where(charted[:, None], uv[1], 0.0)
+    waves = many_waves(across, np.where(charted, lengths, 1.0), block.closed, compiled=True)
     figures = {
         "wave_height": waves.mean,
         "distance_max": most,

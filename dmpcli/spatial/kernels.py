@@ -71,8 +71,19 @@ def _products(C: Floats, M: Floats, R: Floats) -> None:
 
 
 @kernel
+def _small_steps(angles: Floats) -> bool:
+    """Tell whether no step of an angle (T,) is large enough to be a turn, or of another set."""
+    large = 0
+    for t in range(len(angles) - 1):
+        large |= 1 if abs(angles[t + 1] - angles[t]) >= _NEAR else 0
+    return large == 0
+
+
+@kernel
 def _unwound(angles: Floats, steps: Floats) -> bool:
     """Unwrap an angle (T,); tell whether its steps are too small for another set to be meant."""
+    if _small_steps(angles):
+        return True
     samples = len(angles)
     largest = 0.0
     turning = 0.0
@@ -88,6 +99,15 @@ def _unwound(angles: Floats, steps: Floats) -> bool:
             whole += steps[t]
             angles[t + 1] -= 2.0 * _PI * whole
     return largest < _NEAR
+
+
+@kernel
+def _any_below(values: Floats, least: float) -> bool:
+    """Tell whether one of so many values is no more than this."""
+    found = 0
+    for t in range(len(values)):
+        found |= 1 if values[t] <= least else 0
+    return found != 0
 
 
 @kernel
@@ -124,5 +144,5 @@ def euler_of_products(C: Floats, M: Floats, out: Floats) -> Booleans:
         sound = _unwound(rx, steps)
         sound &= _unwound(ry, steps)
         sound &= _unwound(rz, steps)
-        special[b] = cosine.min() <= _SINGULAR or not sound
+        special[b] = _any_below(cosine, _SINGULAR) or not sound
     return special

@@ -62,3 +62,12 @@ def test_lengths_tilts_and_heights_are_those_of_each_stroke(seed):
     for k, found in zip((0.5, 2.0), stretched, strict=True):
         steps = np.linalg.norm(np.diff(foot[0, :, :2] * [k, 1.0], axis=0), axis=1)
         assert found == pytest.approx(steps.sum())
+
+
+def test_heights_that_rounding_alone_tells_apart_are_level(monkeypatch):
+    phase = np.linspace(0.0, 1.0, 40)
+    place = np.stack([9.0 * phase, np.sin(9.0 * phase), 2.0 + 1e-14 * np.sin(99.0 * phase)], axis=1)
+    taught = many.TaughtHeights(phase, place)
+    monkeypatch.setattr(taught, "_nearest", None)  # nothing is looked for
+    uv = np.stack([place[:, :2].T + 0.3] * 3, axis=1)
+    assert taught.at(phase, uv, np.array([0.5, 1.0, 2.0])) == pytest.approx(2.0, abs=1e-12)

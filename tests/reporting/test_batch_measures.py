@@ -2,6 +2,8 @@
 
 import importlib.util
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from dmpcli.dmp.smoothing import Trajectory as Recording
 from dmpcli.records import dataset, file_io, record, schemas
 from dmpcli.reporting import stroke_measures
 from dmpcli.reporting.batch import histogram, measure
-from dmpcli.reporting.batch_measures import measured_parts
+from dmpcli.reporting.batch_measures import measured_parts, strokes_of_rows
 from dmpcli.reporting.measurement_context import MeasurementContext
 from dmpcli.reporting.report_surface import ReportSurface, placed
 from dmpcli.reporting.stroke_block import FIGURES
@@ -288,6 +290,34 @@ def test_parts_larger_than_a_row_group_are_read_in_pieces(tmp_path):
     np.testing.assert_allclose(
         together(cut, reference), together(whole, reference), rtol=1e-12, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("at_once", [1, 600, 1503, 4000])
+def test_what_is_measured_does_not_depend_on_how_much_is_read_at_once(
+    tmp_path, monkeypatch, at_once
+):
+    uneven = strokes(7) + strokes(4, n=251, seed=9) + strokes(6, n=400, seed=2)
+    folder = put_batch(tmp_path / "b", [strokes(9), uneven])
+    whole = together(folder, taught())
+    monkeypatch.setattr(dataset, "_ROWS", at_once)
+    np.testing.assert_allclose(together(folder, taught()), whole, rtol=1e-12, atol=1e-12)
+    batch, _ = dataset.read(folder)
+    rows = np.array([1, 8, 12, 25])
+    found = strokes_of_rows(batch, "b", MeasurementContext(taught()), rows)
+    assert [stroke.label for stroke in found.values()] == [f"b[{row + 1}]" for row in rows]
+    assert [len(stroke.t) for stroke in found.values()] == [501, 501, 501, 400]
+
+
+def test_reading_a_batch_loads_no_pandas(tmp_path):
+    folder = put_batch(tmp_path / "b", [strokes(3, n=40)], failed=("nothing there",))
+    code = (
+        "import pathlib, sys; from dmpcli.records import dataset\n"
+        f"batch, _ = dataset.read(pathlib.Path({str(folder)!r}))\n"
+        "print(len(list(dataset.pieces(batch, ()))), len(dataset.states_of(batch)[1]))\n"
+        "print('pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert done.stdout.decode().splitlines() == ["1 1", "False"]
 
 
 def test_only_some_strokes_are_read_again(tmp_path):
