@@ -144,13 +144,6 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
     return np.dtype(f"{letter}{kind.bit_width // 8}")
 
 
-def taken(values: Any, rows: Integers) -> Any:
-    """Return values of a pyarrow array by their rows (k,)."""
-    index = np.ascontiguousarray(rows, dtype=np.int64)
-    # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
-    return values.take(pa.Array.from_buffers(pa.int64(), len(index), [None, pa.py_buffer(index)]))
-
-
 def numbers(values: Any) -> AnyArray:
     """Copy of the numbers of a pyarrow array, whatever stands at its nulls."""
     return viewed(values).copy()
@@ -170,18 +163,22 @@ def joined(chunked: Any) -> AnyArray:
     found = np.empty(len(chunked), dtype=dtype_of(chunked.type))
     first = 0
     for chunk in chunked.chunks:
-        if len(chunk):
-            whole = np.frombuffer(chunk.buffers()[1], dtype=found.dtype)
-            found[first : first + len(chunk)] = whole[chunk.offset : chunk.offset + len(chunk)]
-            first += len(chunk)
+        found[first : first + len(chunk)] = viewed(chunk)
+        first += len(chunk)
     return found
 
 
 def arrow(values: AnyArray) -> Any:
-    """Arrow array over an array of numbers, shape (rows,): pa.array would import pandas."""
+    """Arrow array over an array of numbers, shape (rows,)."""
+    # From buffers: pa.array would import pandas, a third of a second, only to ask what this is.
     kind = pa.from_numpy_dtype(values.dtype)
     data = pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(kind, len(values), [None, data])
+
+
+def taken(values: Any, rows: Integers) -> Any:
+    """Return values of a pyarrow array by their rows (k,)."""
+    return values.take(arrow(rows))
 
 
 def all_within(values: AnyArray, largest: float) -> bool:

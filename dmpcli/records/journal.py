@@ -26,6 +26,7 @@ import pyarrow as pa
 from dmpcli.arrays import Floats
 from dmpcli.errors import InputError, InstrumentError
 from dmpcli.records import file_io
+from dmpcli.records.columns import arrow
 from dmpcli.records.file_io import Source
 from dmpcli.records.record import Provenance
 from dmpcli.records.row_buffer import RowBuffer
@@ -255,8 +256,7 @@ def _batch(rows: RowBuffer, first: int, last: int, fields: Any) -> tuple[Any, in
 
 
 def _listed(values: Floats, width: int) -> Any:
-    # From buffers: pa.array would import pandas.
-    plain = pa.Array.from_buffers(pa.float64(), len(values), [None, pa.py_buffer(values)])
+    plain = arrow(values)
     return plain if width == 1 else pa.FixedSizeListArray.from_arrays(plain, width)
 
 
