@@ -58,7 +58,8 @@ def command(
     if demonstrations.count(file_io.DASH) > 1:
         raise InputError("-: standard input can be read only once")
     sources = [file_io.read(path) for path in demonstrations]
-    strokes = [recording(source, layout, settings.force_profile) for source in sources]
+    span = settings.start, settings.until
+    strokes = [recording(source, layout, settings.force_profile, span) for source in sources]
     named = None
     if surface_at is not None:
         named = surface_input.read(surface_at, surface_pose, surface_unit, summary=True)

@@ -14,7 +14,7 @@ from dmpcli.dmp.segmentation import Span
 from dmpcli.dmp.spline_smoothing import SmoothSpline
 from dmpcli.dmp.time_base import continuous_quaternions
 from dmpcli.errors import InputError
-from dmpcli.spatial import rotations
+from dmpcli.spatial import recording_gaps, rotations
 from dmpcli.spatial.trajectory import Trajectory
 
 # Fewer samples are no stroke.
@@ -145,9 +145,12 @@ def preprocess(
         The tool does not move, or fewer than ten samples are left.
     """
     _check_moves(stroke.position)
+    began = float(stroke.t[0])
+    stroke = _of(stroke, recording_gaps.inside(stroke.t, start, until))
+    _check_moves(stroke.position)
     base = time_base.even(stroke)
     # Times from the recording's first sample; an averaged burst begins a little later.
-    begin = base.origin - float(stroke.t[0])
+    begin = base.origin - began
     whole = base.stroke
     sigma = noise.estimate(whole.position)
     found = segmentation.segment(whole, sigma)
@@ -197,7 +200,7 @@ def preprocess(
         position,
         quaternion,
         (first, part.duration - last),
-        tuple((a - float(stroke.t[0]), b - float(stroke.t[0])) for a, b in base.gaps),
+        tuple((a - began, b - began) for a, b in base.gaps),
         tuple(_later(span, begin + low) for span in pauses),
         None if strays.approach is None else _later(strays.approach, begin + low),
         None if strays.retract is None else _later(strays.retract, begin + low),
@@ -205,6 +208,18 @@ def preprocess(
         base.merged,
         base.resampled,
         force,
+    )
+
+
+def _of(stroke: Trajectory, part: slice) -> Trajectory:
+    if part == slice(0, len(stroke.t)):
+        return stroke
+    rotation, force = stroke.rotation, stroke.contact_force
+    return Trajectory(
+        stroke.t[part],
+        stroke.position[part],
+        None if rotation is None else rotation[part],
+        contact_force=None if force is None else force[part],
     )
 
 

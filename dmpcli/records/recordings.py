@@ -32,7 +32,7 @@ from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
 from dmpcli.records.schemas import EULER_ANGLES
 from dmpcli.records.tables import HeadlessError, Table
 from dmpcli.records.untrusted import decoder
-from dmpcli.spatial import rotations
+from dmpcli.spatial import recording_gaps, rotations
 from dmpcli.spatial.trajectory import Trajectory
 
 SHORTEST = 10
@@ -50,11 +50,12 @@ SHORTEST_GAP = 5e-10
 LARGEST_TURN = 4 * np.pi
 """Angles beyond this, rad, are in degrees."""
 
-LONGEST_GAP = 25.0
-"""A gap of more median steps than this cannot be filled in: nobody knows what the tool did."""
-
 _FEW_DIGITS = 0.2
 """Where more than this part of the stamps repeats, they were written with too few digits."""
+
+
+Span = tuple[float | None, float | None]
+"""Begin and end of what is wanted, s; None is that of the recording."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,9 @@ class _Reading:
 
 
 @decoder
-def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> Recording:
+def read(
+    source: Source, layout: Layout | None = None, wrench: bool = False, span: Span = (None, None)
+) -> Recording:
     """Read a demonstration for learning.
 
     Parameters
@@ -143,6 +146,8 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
         Of another program's table; one of ours tells its own.
     wrench : bool
         Whether a wrench is wanted too, as `export` writes it: fx ... tz with N and N·m beside.
+    span : (float or None, float or None)
+        What of it is wanted, s from its first sample: a gap outside of that is no matter.
 
     Raises
     ------
@@ -155,7 +160,7 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
         ours = record.decode(source, schemas.DEMONSTRATION)
         _partly_null(ours)
         stroke = Trajectory(ours.t, ours.position(), ours.rotation())
-        _check_time(Table(source.name, ours.columns), stroke.t, "t")
+        _check_time(Table(source.name, ours.columns), stroke.t, "t", span)
         _check_position(Table(source.name, ours.columns), stroke.position)
         felt = _own_wrench(ours) if wrench else None
         return Recording(stroke, ours=True, began=0.0, wrench=felt)
@@ -172,9 +177,10 @@ def read(source: Source, layout: Layout | None = None, wrench: bool = False) -> 
     stroke = Trajectory(t, position, rotation)
     if "sample_rate" not in given.said:
         stroke = _without_repeats(reading, stroke, name)
-    _check_time(reading.table, stroke.t, name)
+    _check_time(reading.table, stroke.t, name, span)
     _check_position(reading.table, stroke.position)
-    _doubt_units(reading, stroke)
+    kept = recording_gaps.inside(stroke.t, *span)
+    _doubt_units(reading, Trajectory(stroke.t[kept], stroke.position[kept]))
     reading.doubts += rotation_names.unread(reading.names, reading.taken, rotation is not None)
     if felt is not None and len(felt) != len(stroke.t):
         felt = None
@@ -500,7 +506,7 @@ def _partly_null(ours: record.Record) -> None:
             )
 
 
-def _check_time(table: Table, t: Floats, name: str) -> None:
+def _check_time(table: Table, t: Floats, name: str, span: Span) -> None:
     if len(t) < SHORTEST:
         raise InputError(f"{table.name}: {len(t)} samples; a stroke needs at least {SHORTEST}")
     steps = np.diff(t)
@@ -529,12 +535,15 @@ def _check_time(table: Table, t: Floats, name: str) -> None:
             f"{table.name}: column {name!r}, {table.at(row)}: comes {steps[row - 1]:.3g} s after "
             "the row before; mend or remove the row, or check the unit of time (--time-unit)"
         )
-    if np.any(steps > LONGEST_GAP * step):
-        row = int(np.argmax(steps)) + 1
+    kept = recording_gaps.inside(t, *span)
+    gaps = steps[kept.start : kept.stop - 1]
+    if np.any(gaps > recording_gaps.LONGEST_GAP * step):
+        row = kept.start + int(np.argmax(gaps)) + 1
         raise InputError(
             f"{table.name}: column {name!r}, {table.at(row)}: nothing was recorded "
             f"for {steps[row - 1]:.6g} s, {steps[row - 1] / step:.0f} samples; cut the file there, "
-            "or record again"
+            "or record again; fit leaves out what lies before or after with --from "
+            f"{t[row] - t[0]:.6g} or --until {t[row - 1] - t[0]:.6g}"
         )
 
 

@@ -175,7 +175,7 @@ def fit(
     force = resolved.force_profile
     strokes = []
     for file, form in zip(files, forms, strict=True):
-        found = recordings.read(file, form, force)
+        found = recordings.read(file, form, force, (resolved.start, resolved.until))
         strokes.append(with_force(found, file.name) if force else found.stroke)
     known = [form for form in forms if form is not None]
     if any(form != known[0] for form in known):

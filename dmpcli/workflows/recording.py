@@ -7,11 +7,13 @@ from dmpcli.messages import tell, warn
 from dmpcli.records import recordings
 from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import Layout
-from dmpcli.records.recordings import Recording
+from dmpcli.records.recordings import Recording, Span
 from dmpcli.spatial.trajectory import Trajectory
 
 
-def recording(source: Source, layout: Layout | None, force: bool = False) -> Trajectory:
+def recording(
+    source: Source, layout: Layout | None, force: bool = False, span: Span = (None, None)
+) -> Trajectory:
     """Read a recording, and say how it was read and what is doubtful about it.
 
     Parameters
@@ -20,13 +22,15 @@ def recording(source: Source, layout: Layout | None, force: bool = False) -> Tra
     layout : Layout or None
     force : bool
         Whether the force on the tool is wanted too.
+    span : (float or None, float or None)
+        What of it is wanted, s from its first sample.
 
     Raises
     ------
     InputError
         It holds no force in every row.
     """
-    found = whole(source, layout, force)
+    found = whole(source, layout, force, span)
     return with_force(found, source.name) if force else found.stroke
 
 
@@ -40,9 +44,11 @@ def with_force(found: Recording, name: str) -> Trajectory:
     return replace(found.stroke, contact_force=found.wrench[:, :3])
 
 
-def whole(source: Source, layout: Layout | None, wrench: bool = False) -> Recording:
+def whole(
+    source: Source, layout: Layout | None, wrench: bool = False, span: Span = (None, None)
+) -> Recording:
     """Read a recording with all that was said of it, which is told; see `recordings.read`."""
-    found = recordings.read(source, layout, wrench)
+    found = recordings.read(source, layout, wrench, span)
     if found.ours and layout is not None:
         tell(
             f"{source.name}: is dmpcli's own and tells its columns and units; options were not used"

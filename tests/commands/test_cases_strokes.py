@@ -460,6 +460,24 @@ def test_a_retract_alone_is_told(lab):
     assert not warnings(said)
 
 
+@pytest.mark.parametrize("after", [1.5, 3600.0])
+def test_a_gap_outside_of_what_is_asked_for_is_no_matter(lab, after):
+    """A recorder that ran before the stroke, stood still, and ran on after it."""
+    before = np.column_stack([np.arange(50) / 100.0, np.zeros((50, 2)), np.full(50, 80.0)])
+    stroke = np.column_stack([np.linspace(2.0, 8.0, len(WAVE)), WAVE])
+    later = before + [8.0 + after, 0.0, 0.0, 0.0]
+    rows = np.concatenate([before, stroke, later])
+    file = cases.write(lab.folder / f"gaps_{after}.csv", rows)
+    done = lab.run("fit", file, "-o", lab.folder / "gaps.json")
+    assert done.exit_code == 2
+    assert "nothing was recorded" in done.stderr
+    skill, said = lab.fit(f"gaps_{after}", "--from", 2.0, "--until", 8.0, tables=[rows])
+    assert not warnings(said)
+    drawn, _ = lab.draw(skill, *pair([0, 0, 0], [300, 0, 0]))
+    assert deviation(drawn.position(), PATH)[0] <= 0.05
+    assert json.loads(skill.read_text())["duration"] == pytest.approx(6.0, abs=0.05)
+
+
 # Nearly closed.
 
 
