@@ -47,6 +47,7 @@ def main() -> None:
     place = Path(sys.argv[1])
     place.mkdir(parents=True, exist_ok=True)
     ready.load()
+    memory.keep()  # as who draws parts does
     sections = {
         "lift": lift, "draw": draw, "surface": surface, "files": files, "start": start,
     }  # fmt: skip

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.records.layouts import LENGTH
@@ -111,6 +110,8 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
 
 def _coded(table: Table, name: str) -> tuple[Integers, list[str]]:
     """Number of each row's word, shape (rows,), and the words, without blanks about them."""
+    import pyarrow.compute as pc
+
     if name not in table.columns:
         values = pa.array([_words(row) for row in np.stack(_pose_cells(table), axis=1).tolist()])
     else:

@@ -77,7 +77,7 @@ _Some = tuple[BatchFolder, Piece, Integers, Floats, str, MeasurementContext, int
 
 
 class _SharedCourse:
-    """The course of a piece's strokes that share their times: always told by their first block.
+    """The course of a part's strokes that share their times: always told by their first block.
 
     So what is measured does not depend on how many blocks are measured at once.
     """
@@ -112,11 +112,15 @@ def _blocks(
     curved = lying and not (sight.compiled and sight.normal is not None)
     parts = None if only is None else np.unique(batch.part[only]).tolist()
 
+    courses: dict[bytes, _SharedCourse] = {}
+    name = None
     for piece in dataset.pieces(batch, more, parts):
+        if piece.name != name:
+            name, courses = piece.name, {}
         for which, t in _alike(piece):
             if only is not None:
                 which = which[np.isin(piece.rows[which], only)]
-            course = _SharedCourse()
+            course = courses.setdefault(t.tobytes(), _SharedCourse())
             size = max(1, (_BY_KERNELS if sight.compiled else _SAMPLES) // len(t))
             size = min(size, AT_ONCE) if curved else size
             for number, those in _apart(batch, piece, which, sight):

@@ -133,7 +133,7 @@ def placed(
     if taught is not None:
         known = np.isfinite(lengths)
         stretch = lengths / taught_length
-        meant = measure.stretched_lengths(taught.place[:, :2], stretch[known])
+        meant = _stretched_lengths(block, taught, stretch[known])
         length_change[known] = length[known] / meant - 1.0
         # The original model has no w: it does not know what off the surface means.
         if block.bound and charted.any():
@@ -182,7 +182,7 @@ def _on_plane(
     length_change = np.full(count, np.nan)
     if taught is not None:
         stretch = lengths[charted] / taught_length
-        meant = lying.stretched_lengths(taught.place, stretch)
+        meant = _stretched_lengths(block, taught, stretch)
         length_change[charted] = length[charted] / meant - 1.0
         if block.bound and charted.any():
             phase = block.t / block.t[-1]
@@ -222,6 +222,15 @@ def _over_feet(block: Block, foot: Floats, normal: Floats) -> tuple[Floats, Floa
     height, length = np.empty(foot.shape[:2]), np.empty(len(foot))
     lying.over_feet(block.points, foot, normal, height, length)
     return height, length
+
+
+def _stretched_lengths(block: Block, taught: measure.TaughtHeights, stretch: Floats) -> Floats:
+    """Lengths (B,) of the demonstration, u stretched by so much (B,), along the surface, mm."""
+    if not block.compiled:
+        return measure.stretched_lengths(taught.place[:, :2], stretch)
+    from dmpcli.metrics.kernels import lying
+
+    return lying.stretched_lengths(taught.place, stretch)
 
 
 def _tilts(block: Block, normal: Floats) -> dict[str, Floats]:

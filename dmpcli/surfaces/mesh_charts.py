@@ -107,22 +107,26 @@ class MeshCharts:
         Charts that are all smooth may bring their strips with nodes that were `walked` before.
         """
         shape = coordinates.shape
-        foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
         axes = np.empty((*shape[:2], 3, 3))
         outside, status = np.ones(shape[:2], dtype=bool), self.status.copy()
         face, stretch = np.full(shape[:2], -1), np.ones(shape[:2])
         unfolded = self.creased & (status == Status.DRAWN)
         smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
-        if len(smooth) < len(axes):
+        every = len(smooth) == len(axes)
+        if not every:
+            foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
             axes[:] = np.eye(3)
         if len(smooth):
             u, v = coordinates[smooth, :, 0], coordinates[smooth, :, 1]
             part = strip_chart.lift(self.mesh, self.centre.rows(smooth), u, v, walked)
-            foot[smooth] = part.foot
-            e_u = cross(part.across, part.normal)
-            rows: Integers | slice = smooth if len(smooth) < len(axes) else slice(None)
-            for i, column in enumerate((e_u, part.across, part.normal)):
-                axes[rows, :, :, i] = column
+            if every:
+                foot = part.foot
+                self._lay(part, axes)
+            else:
+                foot[smooth] = part.foot
+                some = np.empty((len(smooth), *axes.shape[1:]))
+                self._lay(part, some)
+                axes[smooth] = some
             outside[smooth], face[smooth], stretch[smooth] = part.outside, part.face, part.stretch
             status[smooth] = np.where(part.sharp, Status.DRAWN, part.status)
             unfolded[smooth[part.sharp]] = True
@@ -137,6 +141,16 @@ class MeshCharts:
         position = foot + coordinates[..., 2:] * axes[..., 2]
         unsound = self._unsound(np.flatnonzero(status == Status.BORDER), feet)
         return ChartImage(position, axes, outside, status, unfolded, unsound)
+
+    def _lay(self, part: strip_chart.Samples, axes: Floats) -> None:
+        """Fill in the axes (B, T, 3, 3) of samples on smooth strips."""
+        if self.mesh.compiled:
+            from dmpcli.surfaces.kernels import samples
+
+            samples.frames(part.across, part.normal, axes)
+            return
+        for i, column in enumerate((cross(part.across, part.normal), part.across, part.normal)):
+            axes[..., i] = column
 
     def _unsound(self, left: Integers, feet: last_check.Feet) -> Booleans | None:
         """Points (B, T) that are wrong of strokes that left the surface; None where none did."""

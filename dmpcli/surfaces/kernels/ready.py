@@ -27,6 +27,7 @@ _ENTRIES = (
     stepping.ends,
     stepping.lines,
     samples.lift,
+    samples.frames,
     checks.sound,
     facet_walks.run,
     smoothing.smoothed,
@@ -90,6 +91,7 @@ def load() -> None:
     )
     where = samples.SampleLimits(0.01, 0.05)
     samples.lift(facets, strip, flat, flat, one, number, where, feet)
+    samples.frames(line, line, np.empty((0, 1, 3, 3)))
     checked = checks.CheckedStrokes(line, line, line, flat.astype(np.int64), flat, flags, v, v, v)
     checks.sound(facets.reals, number, checked, checks.CheckLimits(3.0, 0.3, 1e-3, 0.9, 1e-6, 0.01))
     facet_walks.run(facets.reals, facets.numbers, v, v, number, one[:, 0], 1)

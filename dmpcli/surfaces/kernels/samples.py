@@ -30,7 +30,17 @@ from dmpcli.surfaces.kernels.tree import (
     smooth_normal,
     stack,
 )
-from dmpcli.surfaces.kernels.vectors import Vector, across, add, dot, length, sub, times, unit
+from dmpcli.surfaces.kernels.vectors import (
+    Vector,
+    across,
+    add,
+    cross,
+    dot,
+    length,
+    sub,
+    times,
+    unit,
+)
 
 _NEAR = 0.3
 """Samples further from their facet are looked for in the tree, mm."""
@@ -341,3 +351,15 @@ def lift(
             out.normal[b, k, 0], out.normal[b, k, 1], out.normal[b, k, 2] = n
             side = across(way, n)
             out.across[b, k, 0], out.across[b, k, 1], out.across[b, k, 2] = side
+
+
+@kernel
+def frames(side: Floats, normal: Floats, out: Floats) -> None:
+    """Fill in axes (B, T, 3, 3) with columns e_u, e_v, n of unit vectors e_v, n (B, T, 3)."""
+    for b in range(len(out)):
+        for k in range(out.shape[1]):
+            e_v = side[b, k, 0], side[b, k, 1], side[b, k, 2]
+            n = normal[b, k, 0], normal[b, k, 1], normal[b, k, 2]
+            e_u = cross(e_v, n)
+            for i in range(3):
+                out[b, k, i, 0], out[b, k, i, 1], out[b, k, i, 2] = e_u[i], e_v[i], n[i]
