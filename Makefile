@@ -68,7 +68,8 @@ setup: $(VENV)/installed
 # are looked at meanwhile; types, which mypy takes a minute and a half for in a clone that is new,
 # are a step of their own. Some tests wait in real time: so there are three processes to two cores,
 # and of the thorough, which wait most, four; WORKERS=N chooses. In a clone that is new one process
-# makes the asserts of all tests ready, not each.
+# makes the asserts of all tests ready, not each; and linear algebra has one thread in each, since
+# those of three processes would wait for one another, a tenth of the processor's time.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest
@@ -78,6 +79,7 @@ TWICE := $(MANY) $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
 QUICK := $(MORE) -m "not slow and not thorough"
 READY := [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }
 
+test test-quick: export OPENBLAS_NUM_THREADS := 1
 test: $(VENV)/installed
 	@mkdir -p $(CACHE)
 	@nice -n 5 $(MAKE) --no-print-directory rules > $(OUT)/lint.log 2>&1 & lint=$$!; \

@@ -70,7 +70,7 @@ class Loop:
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.integers(0, 10_000), st.booleans(), st.integers(0, 45))
 def test_a_cycle_of_the_matrix_is_one_of_the_loop_part_by_part(seed, integrates, steps):
     rng = np.random.default_rng(seed)

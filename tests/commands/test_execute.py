@@ -408,7 +408,7 @@ def short(tmp_path_factory):
 
 
 @pytest.mark.slow
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(option=st.sampled_from(sorted(NUMBERS)), data=st.data())
 def test_no_finite_number_ends_in_a_traceback(short, option, data):
     values = [repr(data.draw(EXTREME)) for _ in range(NUMBERS[option])]

@@ -421,7 +421,7 @@ def test_ctrl_c_in_the_air_decelerates_on_the_path_and_the_rest_is_named(tmp_pat
 def test_report_measures_each_stroke_of_a_run(batch, tmp_path):
     out = tmp_path / "run.parquet"
     execute(batch, "-o", out)
-    result = CliRunner().invoke(app, ["report", str(out), "-o", str(tmp_path / "r"), "--json"])
+    result = CliRunner().invoke(app, ["report", str(out), "--json"])
     assert result.exit_code == 0, result.stderr
     (entry,) = json.loads(result.stdout)["files"]
     assert [row["stroke"] for row in entry["strokes"]] == [f"run[{name}]" for name in PLACES]

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from dmpcli import extras
 from dmpcli.cli import app
 from dmpcli.records import file_io, record, schemas
+from dmpcli.reporting import figures
 from tests.extras_here import needs
 from tests.reporting.batches import put_batch
 from tests.reporting.example_files import GOAL, START, demonstration, put, wave
@@ -55,6 +56,12 @@ def demo(tmp_path):
 def folder(tmp_path):
     parts = [waves(HEIGHTS[:18]), waves(HEIGHTS[18:], 18.0)]
     return put_batch(tmp_path / "batch", parts, FAILED)
+
+
+@pytest.fixture
+def without_figures(monkeypatch):
+    """They take most of a report's time, and other tests look at them."""
+    monkeypatch.setattr(figures, "gallery", lambda shown: [])
 
 
 def refused(*words):
@@ -135,7 +142,7 @@ def test_the_folder_holds_a_row_per_stroke_a_row_per_height_and_figures(tmp_path
 
 
 @pytest.mark.slow
-def test_ids_are_cells_of_their_own(tmp_path):
+def test_ids_are_cells_of_their_own(tmp_path, without_figures):
     folder = put_batch(tmp_path / "a, b", [waves(HEIGHTS)])
     out = tmp_path / "out"
     assert dmpcli(folder, "-o", out, "-q").exit_code == 0
@@ -236,7 +243,9 @@ def written(output, *words):
 @pytest.mark.parametrize(
     "means", ["pure", pytest.param("compiled", marks=[needs(extras.FAST), pytest.mark.thorough])]
 )
-def test_any_number_of_processes_writes_the_same_bytes(tmp_path, demo, folder, means):
+def test_any_number_of_processes_writes_the_same_bytes(
+    tmp_path, demo, folder, means, without_figures
+):
     one, two = (
         written(tmp_path / f"jobs-{jobs}", demo, folder, "--jobs", jobs, "--kernels", means)
         for jobs in (1, 2)

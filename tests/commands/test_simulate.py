@@ -59,20 +59,6 @@ def test_it_serves_until_a_signal_ends_it(number, code):
 
 
 @pytest.mark.slow
-def test_a_long_look_ahead_is_warned_of():
-    with Lab("-q", "--lookahead", "0.2") as lab:
-        assert lab.line.startswith("ready ")
-    assert "--lookahead 0.2: above 0.15 s the drag swings" in lab.told
-
-
-@pytest.mark.slow
-def test_quiet_says_nothing():
-    with Lab("-q") as lab:
-        assert lab.line.startswith("ready ")
-    assert lab.told == ""
-
-
-@pytest.mark.slow
 def test_the_arm_is_parked_at_the_start_of_the_stroke():
     with Lab("--start", "-600", "100", "-20", "--goal", "-650", "100", "-20") as lab:
         client = Client(rpc_port(lab))
@@ -223,10 +209,11 @@ def test_what_is_bound_beyond_loopback_is_known(host, alone):
 
 
 @pytest.mark.slow
-def test_a_bind_beyond_loopback_is_warned_of():
-    with Lab("-q", "--host", "0.0.0.0") as lab:
+def test_a_bind_beyond_loopback_and_a_long_look_ahead_are_warned_of_else_it_is_quiet():
+    with Lab("-q", "--host", "0.0.0.0", "--lookahead", "0.2") as lab:
         assert lab.sensor.startswith("netft://0.0.0.0:")
     assert "--host 0.0.0.0: whoever reaches this computer there can move" in lab.told
+    assert "--lookahead 0.2: above 0.15 s the drag swings" in lab.told
     with Lab("-q") as lab:
-        pass
+        assert lab.line.startswith("ready ")
     assert lab.told == ""

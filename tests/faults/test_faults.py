@@ -29,9 +29,9 @@ def test_invariants_hold_whatever_fails():
 
 @pytest.mark.sweep(kept=1)
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(0, len(MORE), 30))
+@pytest.mark.parametrize("first", range(0, len(MORE), 15))
 def test_invariants_hold_for_every_kind_of_fault_on_many_a_command(first):
-    hold(MORE[first : first + 30])
+    hold(MORE[first : first + 15])
 
 
 def test_these_seeds_put_on_every_kind_of_fault_and_run_every_command():

@@ -4,14 +4,19 @@ import resource
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 
 from benchmarks import soak
 from dmpcli.records import file_io, record
+from tests.commands.running import ended
 from tests.pipeline.conftest import DMPCLI
 
 pytestmark = pytest.mark.slow
+
+RECORDED = Path(__file__).parents[2] / "sample_runs" / "recorded.parquet"
+EASED = ("--ease-in", "0.5", "--ease-out", "0.5")
 
 # Busy machines are late; a robot with a long look-ahead bears it.
 PATIENT = ("--robot", "mock:?lag=0.2", "--following-error", "50")
@@ -23,7 +28,12 @@ def read(path):
 
 @pytest.fixture(scope="module")
 def traj(tmp_path_factory):
-    return soak.stroke(tmp_path_factory.mktemp("stroke"))
+    """A trajectory of ten seconds."""
+    folder = tmp_path_factory.mktemp("stroke")
+    skill, traj = folder / "skill.json", folder / "traj.parquet"
+    ended("fit", RECORDED, "-o", skill, "-q")
+    ended("generalize", skill, "-o", traj, "--reproduce", *EASED, "-q")
+    return traj
 
 
 @pytest.mark.thorough
