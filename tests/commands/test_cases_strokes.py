@@ -382,6 +382,7 @@ def test_filtered_noise_too_large_to_be_believed_is_kept_and_told(lab, frequency
     assert np.linalg.norm(step, axis=1).sum() <= 0.8 * np.linalg.norm(rough, axis=1).sum()
 
 
+@pytest.mark.sweep(kept=1)
 @pytest.mark.parametrize("there", [slice(0, 400), slice(200, None)])
 def test_filtered_noise_of_a_part_of_the_recording_is_kept_and_told(lab, there):
     noise = np.zeros((601, 3))
