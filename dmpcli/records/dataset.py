@@ -426,7 +426,7 @@ def _part(batch: BatchFolder, file: str, rows: Integers, columns: Sequence[str])
 
     # Trajectories mostly have one length: then none goes on in the next table.
     each = max(1, part.metadata.num_rows // max(1, len(rows)))
-    at_once = max(1, _ROWS // each) * each
+    at_once = _at_once(part.metadata, len(chosen) - 1, each)
     held: _Held | None = None
     for group, table in _tables(part, name, (batch.folder / file).stat().st_size, chosen, at_once):
         with untrusted.decoding(name, f"row group {group + 1}"):
@@ -445,7 +445,19 @@ _Held = tuple[list[str], Integers, dict[str, AnyArray]]
 """Ids of trajectories, where each begins, with the end, and their samples."""
 
 _ROWS = 3 << 16
-"""Samples read at once."""
+"""Samples of larger row groups that are read at once."""
+
+_WHOLE = 1 << 23
+"""Numbers of a row group that is read whole, 64 MiB of them: a tenth quicker than in pieces."""
+
+
+def _at_once(metadata: Any, columns: int, each: int) -> int:
+    """Return how many rows of so many columns to read at once, of trajectories of so many rows."""
+    groups = range(metadata.num_row_groups)
+    largest = max((metadata.row_group(i).num_rows for i in groups), default=0)
+    if largest * columns <= _WHOLE:
+        return max(1, int(largest))
+    return max(1, _ROWS // each) * each
 
 
 def _tables(
