@@ -24,7 +24,8 @@ from benchmarks.batches import curved_pairs, level_pairs
 from benchmarks.cluster_demo import BIN
 from dmpcli.arrays import Floats
 from dmpcli.batch import memory
-from dmpcli.batch.part import Job, Part, draw_part
+from dmpcli.batch.part import Job, Part
+from dmpcli.batch.part_drawing import draw_part
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.dmp.generalization import draw_blocks

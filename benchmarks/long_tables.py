@@ -3,7 +3,8 @@
 A CSV table of so many pairs (100,000 and 10,000,000) is read, checked and written as a batch whose
 drawing is replaced by nothing: what is left is the table, the ledger and the manifest. Each length
 has a process of its own; processor time per pair, and the largest memory. ``resume`` instead of
-lengths: 5,000 parts that were drawn, and the run that goes on from them.
+lengths: 5,000 parts that were drawn, and the run that goes on. ``surfaces`` before the lengths:
+a table that names one of 1,000 surfaces for each pair, of which one shard in a hundred is drawn.
 """
 
 import contextlib
@@ -25,20 +26,23 @@ COLUMNS = "id,x0,y0,z0,xg,yg,zg"
 AT_ONCE = 100_000
 
 
-def table(place: Path, rows: int) -> Path:
-    """Write a table of level pairs with ids."""
-    path = place / f"pairs-{rows}.csv"
+def table(place: Path, rows: int, surfaces: int = 0) -> Path:
+    """Write a table of level pairs with ids; on one of so many planes each, if there are any."""
+    path = place / (f"pairs-{rows}-on-{surfaces}.csv" if surfaces else f"pairs-{rows}.csv")
     if path.exists():
         return path
     rng = np.random.default_rng(0)
+    for i in range(surfaces):
+        (place / f"plane-{i}.json").write_text('{"point": [0, 0, 0], "normal": [0, 0, 1]}')
     with path.open("w") as stream:
-        stream.write(COLUMNS + "\n")
+        stream.write(COLUMNS + (",surface\n" if surfaces else "\n"))
         for first in range(0, rows, AT_ONCE):
             count = min(AT_ONCE, rows - first)
             start = rng.uniform(-300, 300, (count, 2)).round(3)
             goal = (start + rng.uniform([40, -60], [100, 60], (count, 2))).round(3)
             for i, (a, b) in enumerate(zip(start.tolist(), goal.tolist(), strict=True), first):
-                stream.write(f"p{i},{a[0]},{a[1]},0,{b[0]},{b[1]},0\n")
+                on = f",plane-{rng.integers(surfaces)}.json" if surfaces else ""
+                stream.write(f"p{i},{a[0]},{a[1]},0,{b[0]},{b[1]},0{on}\n")
     return path
 
 
@@ -56,7 +60,9 @@ def alone(place: Path, rows: int, *more: str) -> None:
     from dmpcli.cli import main as command_line
 
     workers.here = nothing
-    path = table(place, rows)
+    surfaces = 1000 if "--surfaces" in more else 0
+    more = tuple(word for word in more if word != "--surfaces")
+    path = table(place, rows, surfaces)
     words = ["generalize", place / "skill.json", "-o", place / f"batch-{rows}", "--pairs", path]
     sys.argv = ["dmpcli", *map(str, words), "-q", *more]
     begin = time.process_time()
@@ -114,9 +120,11 @@ def main() -> None:
     else:
         print("| pairs | processor s | µs a pair | MiB at most |")
         print("| --- | ---: | ---: | ---: |", flush=True)
-        for rows in sys.argv[2:] or ["100000", "10000000"]:
+        named = sys.argv[2:3] == ["surfaces"]
+        more = ["--surfaces", "--shard", "1/100"] if named else []
+        for rows in sys.argv[2 + named :] or ["100000", "10000000"]:
             words = [sys.executable, "-m", "benchmarks.long_tables", place, "alone", rows]
-            subprocess.run(words, check=True)
+            subprocess.run([*words, *more], check=True)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ import pyarrow as pa
 import scipy
 
 from dmpcli import extras
-from dmpcli.batch.part import Job, Outcome, Part, draw_part
+from dmpcli.batch.part import Job, Outcome, Part
+from dmpcli.batch.part_drawing import draw_part
 from dmpcli.batch.workers import Draw
 from dmpcli.errors import DmpError, InputError, InstrumentError
 from dmpcli.records import file_io

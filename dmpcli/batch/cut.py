@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmpcli.arrays import Floats, Integers
+from dmpcli.arrays import Floats, Integers, first_seen
 
 WINDOW = 100_000
 """Rows that are grouped by their surfaces together."""
@@ -87,8 +87,8 @@ def _window(
     site: Integers, offset: Floats, size: int, most: int, number: int
 ) -> tuple[Integers, int]:
     """Part of each row, the first one with this number, and the number of the next one."""
-    lift, group = _first_seen(offset), _first_seen(site)
-    order = np.lexsort((np.arange(len(site)), group, lift))
+    lift, group = first_seen(offset)[0], first_seen(site)[0]
+    order = np.lexsort((group, lift))  # rows of one group stay in their order
     begins = np.flatnonzero(
         np.diff(lift[order], prepend=-1).astype(bool)
         | np.diff(group[order], prepend=-1).astype(bool)
@@ -107,10 +107,3 @@ def _window(
             part[order[begin : begin + taken]] = number
             begin, used = begin + taken, used + taken
     return part, number + 1
-
-
-def _first_seen(values: Floats | Integers) -> Integers:
-    """Number values in the order in which each is first seen, shape (B,)."""
-    _, first, of = np.unique(values, return_index=True, return_inverse=True)
-    rank: Integers = np.argsort(np.argsort(first))[of.reshape(-1)]
-    return rank

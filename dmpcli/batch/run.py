@@ -117,6 +117,8 @@ class Batch:
         Sites in a part.
     first_part : int
         Number of its first part; those that its rows leave out have none.
+    parts : array of int, shape (B,), optional
+        Number of the part of each row, where these are not all rows and the whole was cut before.
     """
 
     job: Job
@@ -128,6 +130,7 @@ class Batch:
     sites: PairSites | None = None
     most_sites: int = 16
     first_part: int = 0
+    parts: Integers | None = None
 
     def __post_init__(self) -> None:
         self._admitted = self.table.good
@@ -141,10 +144,11 @@ class Batch:
     @cached_property
     def cut(self) -> Cut:
         """Which rows each part has."""
+        if self.parts is not None:
+            return Cut(self.parts - self.first_part)
         if self.sites is None:
             return in_order(self.table.numbers, self.size, self.first_part)
-        lift = np.array([site.offset for site in self.sites.sites] + [0.0])
-        return by_site(self.sites.of, lift[self.sites.of], self.size, self.most_sites)
+        return by_site(self.sites.of, self.sites.lift, self.size, self.most_sites)
 
     def _part(self, number: int) -> Part:
         rows = self.cut.rows(number - self.first_part)

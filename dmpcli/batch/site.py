@@ -8,6 +8,8 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from dmpcli.arrays import Booleans, Floats, Integers
 from dmpcli.batch.task import Task
 from dmpcli.dmp.rollout import Pairs
@@ -130,6 +132,12 @@ class PairSites:
 
     sites: list[Site]
     of: Integers
+
+    @property
+    def lift(self) -> Floats:
+        """Stand-off of each pair, mm; 0 where there is no site."""
+        lift: Floats = np.array([site.offset for site in self.sites] + [0.0])[self.of]
+        return lift
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection, parent_process
 
 from dmpcli.batch import memory, process_pool
-from dmpcli.batch.part import Job, Outcome, Part, draw_part
+from dmpcli.batch.part import Job, Outcome, Part
+from dmpcli.batch.part_drawing import draw_part
 from dmpcli.errors import InputError
 
 Draw = Callable[[Job, Iterable[Part]], Iterator[Outcome]]

@@ -159,18 +159,23 @@ def command(
         tell(f"{file_io.shown(target, output=True)}: {drawn.said}")
         return
 
-    def ready_of(some: "PairTable") -> "Ready":
-        if not sites:
-            return prepared(replace(order, table=some, inputs=list(inputs)))
-        from dmpcli.workflows.generalize_sites import Otherwise, prepared_sites
+    on = None
+    if sites:
+        from dmpcli.workflows.table_sites import Otherwise, TableSites
 
-        otherwise = Otherwise(surface, surface_pose, surface_unit, place.in_)
-        folder = Path() if pairs == file_io.DASH else pairs_at.parent
+        otherwise = Otherwise(surface, surface_pose, surface_unit, place.in_, settings.offset)
+        on = TableSites(Path() if pairs == file_io.DASH else pairs_at.parent, otherwise)
+
+    def ready_of(some: "PairTable") -> "Ready":
         mine = replace(order, table=some, inputs=list(inputs))
-        return prepared_sites(mine, folder, otherwise, wanted.surface_cache)
+        if on is None:
+            return prepared(mine)
+        from dmpcli.workflows.generalize_sites import prepared_sites
+
+        return prepared_sites(mine, on, wanted.surface_cache)
 
     if stream is not None:
-        batches.write_pieces(stream, ready_of, target, wanted, not sites and each_alone(order))
+        batches.write_pieces(stream, ready_of, target, wanted, each_alone(order), on)
         return
     batches.tell_of_unknown(table)
     batches.write(ready_of(table), target, wanted)

@@ -104,8 +104,8 @@ def command(
     layout = form.as_layout()
     read = grounds = None
     if pairs_at is not None:
-        from dmpcli.workflows.generalize_sites import Otherwise
         from dmpcli.workflows.report_sites import SiteGrounds
+        from dmpcli.workflows.table_sites import Otherwise
 
         otherwise = Otherwise(surface, surface_pose, surface_unit)
         grounds = SiteGrounds(pairs_at, otherwise, surface_cache)

@@ -7,7 +7,7 @@ import numpy as np
 
 from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
-from dmpcli.records.tables import Table
+from dmpcli.records.table import Table
 
 NAMES = ("episode_index", "episode", "episode_id", "trial", "demo", "id")
 """Columns that tell recordings apart, the surest first."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Booleans, Floats, Integers, first_seen
 from dmpcli.records.layouts import LENGTH
 from dmpcli.records.schemas import OK
-from dmpcli.records.tables import Table, is_text
+from dmpcli.records.table import Table, is_text
 
 COLUMNS = ("surface", "surface_unit", "pose", "in", "offset")
 
@@ -93,10 +93,9 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
         words.append(known)
     stacked = np.stack(codes, axis=1)
     joined = np.ravel_multi_index(tuple(stacked.T), tuple(len(known) for known in words))
-    _, first, of = np.unique(joined, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))
+    of, first = first_seen(joined)
     places = []
-    for i, row in enumerate(np.sort(first).tolist()):
+    for i, row in enumerate(first.tolist()):
         said = dict(
             zip(COLUMNS, (w[c] for w, c in zip(words, stacked[row], strict=True)), strict=True)
         )
@@ -104,8 +103,8 @@ def read(table: Table, status: list[str]) -> PairPlaces | None:
         places.append(place)
         if odd is not None:
             column, what = odd
-            _mark(table, status, rank[of.reshape(-1)] == i, column, what)
-    return PairPlaces(present, places, rank[of.reshape(-1)])
+            _mark(table, status, of == i, column, what)
+    return PairPlaces(present, places, of)
 
 
 def _coded(table: Table, name: str) -> tuple[Integers, list[str]]:

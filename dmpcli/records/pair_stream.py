@@ -8,9 +8,10 @@ lines of others are passed over: they are counted, not parted.
 """
 
 import hashlib
+import itertools
 import re
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,13 @@ import pyarrow as pa
 
 from dmpcli.arrays import Booleans, Integers
 from dmpcli.errors import InputError
-from dmpcli.records import columns, file_io, pairs, parquet, schemas, tables, untrusted
+from dmpcli.records import columns, file_io, pair_places, pairs, parquet, schemas, tables, untrusted
 from dmpcli.records.file_io import Source
+from dmpcli.records.pair_places import PairPlaces
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.storage import Location
+from dmpcli.records.table import Table
+from dmpcli.records.table_shares import ChosenRows, Share
 
 STREAMED = 64 * 2**20
 """Bytes of a text from which on it is read in pieces."""
@@ -36,38 +40,12 @@ _BLOCK = 1 << 22
 
 _BITS_A_ROW = 64
 
+_PLACES = (*pair_places.COLUMNS, *pair_places.POSE_CELLS)
+
 _BLANK = np.isin(np.arange(256), list(b" \t\r\n#"))
 """Bytes with which a line that is no row may begin."""
 
 _PASSED_OVER = re.compile(rb"[ \t]*(?:#[^\n]*|\r?\n|\r?\Z)")
-
-
-@dataclass(frozen=True)
-class Share:
-    """Some of the rows of a table, which is cut into parts of so many.
-
-    Attributes
-    ----------
-    size : int
-        Rows of a part.
-    has : callable
-        Tells which parts (N,), by their numbers, are of the share.
-    """
-
-    size: int
-    has: Callable[[Integers], Booleans]
-
-    def rows(self, begin: int, end: int) -> Integers:
-        """Return which rows of a stretch are of the share, rising."""
-        parts = np.arange(begin // self.size, -(-end // self.size))
-        rows = np.add.outer(parts[self.has(parts)] * self.size, np.arange(self.size)).ravel()
-        return rows[(rows >= begin) & (rows < end)]
-
-    def count(self, rows: int) -> int:
-        """Return how many of so many rows are of the share."""
-        parts = np.arange(-(-rows // self.size))
-        size = np.minimum(self.size, rows - parts * self.size)
-        return int(size[self.has(parts)].sum())
 
 
 @dataclass(frozen=True)
@@ -81,7 +59,7 @@ class PairStream:
     rows : int
         How many it has; of a text, at most.
     parquet : bool
-    share : Share, optional
+    share : Share or ChosenRows, optional
         Only these rows are read.
     """
 
@@ -89,12 +67,18 @@ class PairStream:
     sha256: str
     rows: int
     parquet: bool
-    share: Share | None = None
+    share: Share | ChosenRows | None = None
+    _held: list[tuple[Table, list[str]]] | None = field(default=None, repr=False)
 
     @property
     def asked(self) -> int:
         """How many rows are read; of a text, at most."""
         return self.rows if self.share is None else self.share.count(self.rows)
+
+    def of_share(self, share: Share | ChosenRows, rows: int) -> "PairStream":
+        """Return a stream of these rows alone, read once if they are no more than a piece has."""
+        own = replace(self, share=share)
+        return own if own.asked > rows else replace(own, _held=list(own._tables(rows)))
 
     def pieces(self, rows: int) -> Iterator[PairTable]:
         """Yield the pairs, so many at once.
@@ -116,7 +100,7 @@ class PairStream:
         InputError
             As `pairs.read`.
         """
-        found = next(replace(self, share=None).pieces(1), None)
+        found = next(replace(self, share=None, _held=None).pieces(1), None)
         if found is None:
             raise InputError(f"{self.path}: holds no rows; it needs a header and at least one row")
         return found
@@ -157,25 +141,52 @@ class PairStream:
                     )
                 seen[name] = table.at(row)
 
-    def _tables(self, rows: int) -> Iterator[tuple[tables.Table, list[str]]]:
-        return self._of_parquet(rows) if self.parquet else self._of_text(rows)
+    def places(self, rows: int) -> Iterator[PairPlaces]:
+        """Yield where pairs lie, as the pieces of so many of them say it, and read nothing else.
 
-    def _of_parquet(self, rows: int) -> Iterator[tuple[tables.Table, list[str]]]:
+        Raises
+        ------
+        InputError
+            As `pairs.read`.
+        """
+        for table, _ in self._tables(rows, _PLACES):
+            with untrusted.decoding(str(self.path)):
+                found = pair_places.read(table, [schemas.OK] * len(table))
+            assert found is not None
+            yield found
+
+    def _tables(
+        self, rows: int, only: Collection[str] | None = None
+    ) -> Iterator[tuple[Table, list[str]]]:
+        """Yield pieces, with no columns but these where they are said, and unknown columns."""
+        if self._held is not None:
+            return iter(self._held)
+        return self._of_parquet(rows, only) if self.parquet else self._of_text(rows, only)
+
+    def _piece_sizes(self, rows: int) -> Iterator[int]:
+        return itertools.repeat(rows) if self.share is None else self.share.pieces(rows)
+
+    def _of_parquet(
+        self, rows: int, only: Collection[str] | None
+    ) -> Iterator[tuple[Table, list[str]]]:
         name = str(self.path)
         known = (*pairs.KNOWN, *schemas.PAIRS.columns)
         opened = parquet.opened(self.path, "make it again", text=())
         with untrusted.decoding(name), opened as file:
             names = file.schema_arrow.names
-            wanted = [one for one in names if one in pairs.KNOWN]
+            wanted = [one for one in names if one in (only or pairs.KNOWN)]
             unknown = [one for one in names if one not in known]
             waiting, numbers = [], np.empty(0, dtype=np.int64)
+            sizes = self._piece_sizes(rows)
+            size = next(sizes)
             for batch, there in self._batches(file, rows, wanted):
                 waiting.append(batch)
                 numbers = np.concatenate([numbers, there])
-                while len(numbers) >= rows:
+                while len(numbers) >= size:
                     table = pa.Table.from_batches(waiting)
-                    yield tables.of_arrow(name, table.slice(0, rows), numbers[:rows]), unknown
-                    numbers, waiting = numbers[rows:], table.slice(rows).to_batches()
+                    yield tables.of_arrow(name, table.slice(0, size), numbers[:size]), unknown
+                    numbers, waiting = numbers[size:], table.slice(size).to_batches()
+                    size = next(sizes)
             if len(numbers):
                 yield tables.of_arrow(name, pa.Table.from_batches(waiting), numbers), unknown
 
@@ -199,19 +210,24 @@ class PairStream:
                 begin += len(batch)
                 yield some, there
 
-    def _of_text(self, rows: int) -> Iterator[tuple[tables.Table, list[str]]]:
+    def _of_text(
+        self, rows: int, only: Collection[str] | None
+    ) -> Iterator[tuple[Table, list[str]]]:
         known = (*pairs.KNOWN, *schemas.PAIRS.columns)
         held = None
-        for table in self._by_lines(rows):
+        sizes = self._piece_sizes(rows)
+        size = next(sizes)
+        for table in self._by_lines(rows, only):
             held = table if held is None else _joined(held, table)
             # Comments and empty lines are no rows: pieces of so many lines may hold fewer.
-            while len(held) >= rows:
-                yield _some(held, slice(0, rows)), _unknown(held, known)
-                held = _some(held, slice(rows, None))
+            while len(held) >= size:
+                yield _some(held, slice(0, size)), _unknown(held, known)
+                held = _some(held, slice(size, None))
+                size = next(sizes)
         if held is not None and len(held):
             yield held, _unknown(held, known)
 
-    def _by_lines(self, rows: int) -> Iterator[tables.Table]:
+    def _by_lines(self, rows: int, only: Collection[str] | None) -> Iterator[Table]:
         above = before = 0
         for head, body in _cut(self.path, rows):
             begins, ends = _lines_of(body)
@@ -223,26 +239,33 @@ class PairStream:
                 of = lines[there - before]
                 text = b"".join([body[begins[line] : ends[line]] for line in of.tolist()])
             if len(there):
-                yield self._parted(head, text, of + above + 1, there)
+                yield self._parted(head, text, of + above + 1, there, only)
             before += len(lines)
             above += len(begins)
 
-    def _parted(self, head: bytes, text: bytes, lines: Integers, rows: Integers) -> tables.Table:
+    def _parted(
+        self,
+        head: bytes,
+        text: bytes,
+        lines: Integers,
+        rows: Integers,
+        only: Collection[str] | None,
+    ) -> Table:
         """Part rows of a text, whose lines follow the head in the file by so many lines."""
         before = head.count(b"\n")
         try:
-            table = tables.read(Source(str(self.path), head + text))
+            table = tables.read(Source(str(self.path), head + text), only=only)
         except InputError as error:
             raise InputError(_further(str(error), before, lines)) from None
         assert table.lines is not None
         return replace(table, lines=before + lines[table.lines - before - 1], rows=rows)
 
 
-def _unknown(table: tables.Table, known: Collection[str]) -> list[str]:
+def _unknown(table: Table, known: Collection[str]) -> list[str]:
     return [name for name in table.columns if name not in known]
 
 
-def _joined(one: tables.Table, other: tables.Table) -> tables.Table:
+def _joined(one: Table, other: Table) -> Table:
     """Return the rows of two pieces of a text as one."""
     assert one.lines is not None
     assert other.lines is not None
@@ -260,7 +283,7 @@ def _joined(one: tables.Table, other: tables.Table) -> tables.Table:
     )
 
 
-def _some(table: tables.Table, rows: slice) -> tables.Table:
+def _some(table: Table, rows: slice) -> Table:
     assert table.lines is not None
     assert table.rows is not None
     some = {name: values[rows] for name, values in table.columns.items()}

@@ -13,7 +13,7 @@ from dmpcli.records.columns import FARTHEST, LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.pair_places import PairPlaces
 from dmpcli.records.schemas import OK
-from dmpcli.records.tables import Table
+from dmpcli.records.table import Table
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 
@@ -105,7 +105,7 @@ def read(source: Source) -> PairTable:
     InputError
         The file cannot be read, holds no rows, lacks a column, or two rows have one id.
     """
-    return decoded(tables.read(source))
+    return decoded(tables.read(source, decimal=None, numeric=_NUMBERS))
 
 
 def decoded(table: Table) -> PairTable:
@@ -116,7 +116,7 @@ def decoded(table: Table) -> PairTable:
     InputError
         As `read`.
     """
-    table = tables.with_decimal_commas(tables.without_blank_rows(table), _NUMBERS)
+    table = tables.without_blank_rows(table)
     status = [OK] * len(table)
     start, goal = _three(table, START, status), _three(table, GOAL, status)
     duration = np.full(len(table), np.nan)

@@ -254,10 +254,25 @@ def plain_text(column: Any) -> Any:
     if pa.types.is_dictionary(kind) and _is_text(kind.value_type):
         column = column.cast(kind.value_type)
         kind = column.type
+    if pa.types.is_fixed_size_binary(kind):
+        return _unpadded(column)
     if kind not in (pa.string_view(), *_BYTES):
         return column
     try:
         return column.cast(pa.large_string() if kind == pa.large_binary() else pa.string())
+    except pa.ArrowInvalid:
+        return column
+
+
+def _unpadded(column: Any) -> Any:
+    """Return bytes of one width, as numpy keeps text, as plain text without the zeros behind it.
+
+    Numbers of 16 bytes that name things are no text, and stay as they are.
+    """
+    import pyarrow.compute as pc
+
+    try:
+        return pc.utf8_rtrim(column.cast(pa.binary()).cast(pa.string()), characters="\0")
     except pa.ArrowInvalid:
         return column
 

@@ -30,7 +30,8 @@ from dmpcli.records.file_io import Source
 from dmpcli.records.layouts import ANGLE, LAYOUTS, LENGTH, NANOSECONDS, TIME, Layout, LayoutColumn
 from dmpcli.records.rotation_forms import EULER_NAMES, QUATERNION_NAMES
 from dmpcli.records.schemas import EULER_ANGLES
-from dmpcli.records.tables import HeadlessError, Table
+from dmpcli.records.table import Table
+from dmpcli.records.tables import HeadlessError
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import recording_gaps, rotations
 from dmpcli.spatial.trajectory import Trajectory

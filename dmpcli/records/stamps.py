@@ -13,7 +13,7 @@ from dmpcli.arrays import Floats
 from dmpcli.errors import InputError
 from dmpcli.records import columns
 from dmpcli.records.layouts import TIME
-from dmpcli.records.tables import Table, is_text
+from dmpcli.records.table import Table, is_text
 
 EPOCH = 1e6
 """A first stamp beyond this, s, counts from an epoch, not from when something was switched on."""

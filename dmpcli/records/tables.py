@@ -7,25 +7,25 @@ their bytes, and a bad cell can still be shown as it stands in the file.
 import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from dmpcli.arrays import Booleans, Floats, Integers
+from dmpcli.arrays import Integers
 from dmpcli.errors import InputError
-from dmpcli.records import columns, list_columns, parquet, untrusted
+from dmpcli.records import columns, decimal_signs, list_columns, parquet, untrusted
 from dmpcli.records.file_io import Source
+from dmpcli.records.table import NUMBER, Table, is_text_array
 from dmpcli.records.text_lines import MARK, TextLines, counted_lines
 from dmpcli.records.untrusted import decoder
 
 _BLOCK, _LARGEST_BLOCK = 1 << 20, 1 << 24
 """Bytes that are parsed at once: what stays in cache, and more where a row is longer."""
 _LONGEST_LINE = 1 << 20
-_NUMBER = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$"
 _SEPARATORS = (b",", b";", b"\t")
-_DECIMAL_COMMA, _DECIMAL_POINT = re.compile(rb"[0-9],[0-9]"), re.compile(rb"[0-9]\.[0-9]")
+_BETWEEN_DIGITS = re.compile(rb"[0-9],[0-9]")
 
 
 class HeadlessError(InputError):
@@ -44,140 +44,6 @@ class HeadlessError(InputError):
         self.line, self.count = line, count
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table as read: columns of numbers or text, all of one length.
-
-    Attributes
-    ----------
-    name : str
-        What messages call the file.
-    columns : mapping
-        Arrays of numpy or Arrow, by the file's own names.
-    lines : array of int, shape (rows,), optional
-        The line of each row in a text file; without it rows are counted from 1.
-    decimal : {'.', ','}
-        The decimal sign of its text.
-    remarks : tuple of str
-        What a person should know of how it was read.
-    rows : array of int, shape (rows,), optional
-        Which rows of the file these are, counted from 0, where they are not all.
-    """
-
-    name: str
-    columns: Mapping[str, Any]
-    lines: Integers | None = None
-    decimal: str = "."
-    remarks: tuple[str, ...] = ()
-    rows: Integers | None = None
-
-    def __len__(self) -> int:
-        return len(next(iter(self.columns.values()), ()))
-
-    def at(self, row: int) -> str:
-        """Return how a person finds row `row`, counted from 0."""
-        if self.lines is not None:
-            return f"line {self.lines[row]}"
-        return f"row {(row if self.rows is None else self.rows[row]) + 1}"
-
-    def numbers(self, column: str) -> Floats:
-        """Return a column as finite numbers, shape (rows,).
-
-        Raises
-        ------
-        InputError
-            The column is missing, or a value is text, empty, NaN or infinite; names the row.
-        """
-        values = self.floats(column)
-        if not columns.all_within(values, columns.LARGEST):
-            bad = ~(np.abs(values) <= columns.LARGEST)
-            row = int(np.argmax(bad))
-            finite = bool(np.isfinite(values[row]))
-            raise InputError(
-                f"{self.name}: column {column!r}, {self.at(row)}: {self.shown(column, row)} is "
-                + (f"beyond {columns.LARGEST:g}" if finite else "not a finite number")
-                + "; mend or remove the row"
-            )
-        return values
-
-    def floats(self, column: str) -> Floats:
-        """Return a column as numbers, shape (rows,): NaN where there is text or no value.
-
-        It may be the table's own: copy what is to be changed.
-
-        Raises
-        ------
-        InputError
-            The column is missing.
-        """
-        if column not in self.columns:
-            raise InputError(
-                f"{self.name}: column {column!r} is missing; it has {', '.join(self.columns)}"
-            )
-        values = self.columns[column]
-        if isinstance(values, np.ndarray):
-            return np.asarray(values, dtype=float)
-        return _floats(values, self.decimal)
-
-    def texts(self, column: str) -> list[str]:
-        """Return a column as text, numbers as a file shows them."""
-        values = self.columns[column]
-        if isinstance(values, np.ndarray):
-            return [str(value) for value in values]
-        return ["" if value is None else str(value) for value in values.to_pylist()]
-
-    def empty(self, column: str) -> Booleans:
-        """Tell which cells of a column hold nothing, shape (rows,)."""
-        values = self.columns[column]
-        if isinstance(values, np.ndarray):
-            return np.asarray(np.isnan(values.astype(float)))
-        if is_text(values.type):
-            import pyarrow.compute as pc
-
-            blank = pc.equal(pc.utf8_trim_whitespace(values), "")
-            return np.array([value is not False for value in blank.to_pylist()], dtype=bool)
-        # What is no number, such as a span of time, is not nothing for that.
-        if pa.types.is_floating(values.type):
-            return np.isnan(_floats(values))
-        return np.array(values.is_null().to_pylist(), dtype=bool)
-
-    def shown(self, column: str, row: int) -> str:
-        """Return a cell as a message shows it."""
-        value = self.columns[column][row]
-        value = value.as_py() if isinstance(value, pa.Scalar) else value
-        return "an empty cell" if value is None or str(value).strip() == "" else repr(str(value))
-
-
-def is_text(kind: Any) -> bool:
-    """Tell an Arrow type of text."""
-    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
-
-
-def _floats(values: Any, decimal: str = ".") -> Floats:
-    """Numbers of an Arrow array; NaN where there is none."""
-    import pyarrow.compute as pc
-
-    if is_text(values.type):
-        text = pc.utf8_trim_whitespace(values)
-        if decimal == ",":
-            text = pc.replace_substring(text, ",", ".")
-        try:
-            values = text.cast(pa.float64())
-        except pa.ArrowInvalid:
-            number = pc.match_substring_regex(text, _NUMBER)
-            text = pc.if_else(number, pc.utf8_ltrim(text, characters="+"), None)
-            values = text.cast(pa.float64())
-    else:
-        try:
-            values = values.cast(pa.float64())
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
-            return np.full(len(values), np.nan)
-    # Not by to_numpy: it would import pandas only to ask what this is.
-    found = columns.numbers(values)
-    found[columns.nulls(values)] = np.nan
-    return found
-
-
 def is_parquet(source: Source) -> bool:
     """Tell a Parquet file by its first bytes."""
     return source.content[:4] == parquet.MAGIC
@@ -189,6 +55,8 @@ def read(
     names: Sequence[str] = (),
     decimal: str | None = ".",
     texts: Collection[str] | None = None,
+    only: Collection[str] | None = None,
+    numeric: Collection[str] | None = None,
 ) -> Table:
     """Read a CSV or Parquet table whole.
 
@@ -202,19 +70,29 @@ def read(
     names : sequence of str
         Of the columns in order, instead of a header line; further columns are named by number.
     decimal : {'.', ','}, optional
-        None: commas where they stand between digits, no point does, and they do not separate.
+        None: as the numbers tell it, see `decimal_signs`.
     texts : collection of str, optional
         Columns that are wanted as they stand. Where this is said, others are parsed as numbers at
         once if all of their cells are; without it every column is kept as text.
+    only : collection of str, optional
+        Of a text, columns that are read; others are passed over.
+    numeric : collection of str, optional
+        Columns of numbers, whose cells tell the decimal sign; without it, all but `texts`.
 
     Raises
     ------
     HeadlessError
         There is no header line.
     InputError
-        Neither Parquet nor text, no rows, or lines of differing length.
+        Neither Parquet nor text, no rows, lines of differing length, or a decimal sign that cannot
+        be told.
     """
-    table = _parquet(source) if is_parquet(source) else _csv(source, names, decimal, texts)
+    if is_parquet(source):
+        table = _parquet(source)
+        if decimal is None:
+            table = decimal_signs.judged(table, numeric or table.columns)
+    else:
+        table = _csv(source, names, decimal, texts, only, numeric)
     if len(table) == 0:
         raise InputError(f"{source.name}: holds no rows; it needs a header and at least one row")
     return table
@@ -244,7 +122,12 @@ def of_arrow(name: str, table: Any, rows: Integers | None = None) -> Table:
 
 
 def _csv(
-    source: Source, given: Sequence[str], decimal: str | None, texts: Collection[str] | None
+    source: Source,
+    given: Sequence[str],
+    decimal: str | None,
+    texts: Collection[str] | None,
+    only: Collection[str] | None,
+    numeric: Collection[str] | None,
 ) -> Table:
     body = counted_lines(source)
     header, numbers = body.first(), body.numbers
@@ -254,9 +137,9 @@ def _csv(
     headless = _are_values(names)
     if headless and not given:
         raise HeadlessError(source.name, int(numbers[0]), len(names))
-    remarks = []
+    remarks: tuple[str, ...] = ()
     if given and not headless:
-        remarks.append(f"line {numbers[0]} is not read: --columns names the columns")
+        remarks = (f"line {numbers[0]} is not read: --columns names the columns",)
     if not headless:
         body = body.rest()
     if given:
@@ -269,48 +152,20 @@ def _csv(
     twice = parquet.twice(names)
     if twice is not None:
         raise InputError(f"{source.name}: column {twice!r} is there twice; rename one")
-    if decimal is None:
-        points = separator == b"," or body.search(_DECIMAL_POINT)
-        comma = not points and body.search(_DECIMAL_COMMA)
-        decimal = "," if comma else "."
-        if comma:
-            remarks.append("commas between digits read as decimal signs")
+    parted = separator == b","
+    if decimal is None and ((parted and b'"' not in body) or not body.search(_BETWEEN_DIGITS)):
+        decimal = "."
     found = None
     if texts is not None and decimal == ".":
         found = _number_columns(body, names, separator, texts)
     if found is None:
-        found = body_columns(body, names, separator, source.name)
+        found = body_columns(body, names, separator, source.name, only)
     rows = len(next(iter(found.values()), ()))
-    return Table(source.name, found, body.numbers[:rows], decimal, tuple(remarks))
-
-
-def with_decimal_commas(table: Table, names: Collection[str]) -> Table:
-    """Return a table with the decimal sign that its columns of numbers have.
-
-    It is the comma where one of them has some between digits and none has a point; that is
-    remarked. What columns of text hold, such as names of files, says nothing.
-    A piece of a file cannot tell: the others may have points, and all are to be read alike.
-
-    Parameters
-    ----------
-    table : Table
-    names : collection of str
-        Of columns of numbers; those that the table lacks are passed over.
-    """
-    import pyarrow.compute as pc
-
-    if table.rows is not None:
+    table = Table(source.name, found, body.numbers[:rows], decimal or ".", remarks)
+    if decimal is not None:
         return table
-    cells = [table.columns[name] for name in names if name in table.columns]
-    cells = [one for one in cells if _is_text_array(one)]
-
-    def some(pattern: str) -> bool:
-        return any(pc.any(pc.match_substring_regex(one, pattern)).as_py() for one in cells)
-
-    if table.decimal == "," or not some(r"[0-9],[0-9]") or some(r"[0-9]\.[0-9]"):
-        return table
-    remark = "commas between digits read as decimal signs"
-    return replace(table, decimal=",", remarks=(*table.remarks, remark))
+    speaking = [one for one in names if one not in (texts or ())] if numeric is None else numeric
+    return decimal_signs.judged(table, speaking, parted)
 
 
 def without_blank_rows(table: Table) -> Table:
@@ -324,7 +179,7 @@ def without_blank_rows(table: Table) -> Table:
     held = table.columns
     if table.lines is None or table.rows is not None:
         return table
-    if not all(map(_is_text_array, held.values())):
+    if not all(map(is_text_array, held.values())):
         return table
     blank = np.ones(len(table), dtype=bool)
     for values in held.values():
@@ -338,10 +193,6 @@ def without_blank_rows(table: Table) -> Table:
         return table
     some = {name: values.take(columns.arrow(kept)) for name, values in held.items()}
     return replace(table, columns=some, lines=table.lines[kept])
-
-
-def _is_text_array(values: Any) -> bool:
-    return not isinstance(values, np.ndarray) and is_text(values.type)
 
 
 def _number_columns(
@@ -388,11 +239,15 @@ _EXACT = 1e6
 
 
 def _is_small(cell: str) -> bool:
-    return re.match(_NUMBER, cell) is not None and abs(float(cell)) <= _EXACT
+    return re.match(NUMBER, cell) is not None and abs(float(cell)) <= _EXACT
 
 
 def _parsed(
-    body: TextLines, names: Sequence[str], separator: bytes, kinds: Mapping[str, Any]
+    body: TextLines,
+    names: Sequence[str],
+    separator: bytes,
+    kinds: Mapping[str, Any],
+    only: Sequence[str] = (),
 ) -> Any:
     from pyarrow import csv
 
@@ -406,7 +261,10 @@ def _parsed(
                 delimiter=separator.decode(), newlines_in_values=b'"' in body
             ),
             convert_options=csv.ConvertOptions(
-                column_types=kinds, strings_can_be_null=False, null_values=[]
+                column_types=kinds,
+                strings_can_be_null=False,
+                null_values=[],
+                include_columns=only,
             ),
         )
 
@@ -419,7 +277,11 @@ def _parsed(
 
 
 def body_columns(
-    body: TextLines, names: Sequence[str], separator: bytes, name: str
+    body: TextLines,
+    names: Sequence[str],
+    separator: bytes,
+    name: str,
+    only: Collection[str] | None = None,
 ) -> dict[str, Any]:
     """Part the rows of a text table.
 
@@ -432,6 +294,8 @@ def body_columns(
     separator : bytes
     name : str
         Of the file, for messages.
+    only : collection of str, optional
+        Columns that are wanted.
 
     Returns
     -------
@@ -447,7 +311,8 @@ def body_columns(
         raise InputError(f"{name}: holds no rows; it needs a header and at least one row")
     # As text: numbers are parsed by column, so that a bad cell can be named with its line.
     try:
-        table = _parsed(body, names, separator, dict.fromkeys(names, pa.string()))
+        some = [] if only is None else [one for one in names if one in only]
+        table = _parsed(body, names, separator, dict.fromkeys(names, pa.string()), some)
     except pa.ArrowInvalid as error:
         raise InputError(f"{name}: {_complaint(str(error), body.numbers, len(names))}") from None
     return {key: table.column(key).combine_chunks() for key in table.column_names}
@@ -479,7 +344,7 @@ def _separator(header: bytes, body: bytes) -> bytes:
 
 
 def _is_number(cell: str) -> bool:
-    return re.match(_NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
+    return re.match(NUMBER, cell.replace(",", ".", 1)) is not None or cell.lower() == "nan"
 
 
 def _are_values(cells: Sequence[str]) -> bool:

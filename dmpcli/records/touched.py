@@ -10,7 +10,7 @@ from dmpcli.records import tables
 from dmpcli.records.columns import LARGEST
 from dmpcli.records.file_io import Source
 from dmpcli.records.schemas import EULER_ANGLES, POSITION
-from dmpcli.records.tables import Table
+from dmpcli.records.table import Table
 from dmpcli.records.untrusted import decoder
 from dmpcli.spatial import rotations
 

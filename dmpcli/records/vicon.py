@@ -12,7 +12,7 @@ import io
 from dmpcli.errors import InputError
 from dmpcli.records import tables, untrusted
 from dmpcli.records.file_io import Source
-from dmpcli.records.tables import Table
+from dmpcli.records.table import Table
 from dmpcli.records.text_lines import MARK, TextLines, every_line
 from dmpcli.records.untrusted import decoder
 

@@ -2,26 +2,32 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 
+import numpy as np
+
+from dmpcli.arrays import Integers
+from dmpcli.batch.cut import by_site
 from dmpcli.batch.part import Job
 from dmpcli.batch.run import MOST_IN_ONE, SHOWN, Batch, BatchSummary, Shard, run
-from dmpcli.batch.site import SitesTold
+from dmpcli.batch.site import PairSites, SitesTold
 from dmpcli.batch.workers import Draw
 from dmpcli.dmp.feasibility import snapped
 from dmpcli.dmp.generalization import draw, seen_from
 from dmpcli.errors import InputError, RefusedError, about, counted
 from dmpcli.messages import heard, progress, tell, tell_as, warn
 from dmpcli.records import file_io, pair_stream, trajectory
-from dmpcli.records.pair_stream import PairStream, Share
+from dmpcli.records.pair_stream import PairStream
 from dmpcli.records.pairs import KNOWN, PairTable
 from dmpcli.records.record import Form
 from dmpcli.records.storage import Location
+from dmpcli.records.table_shares import ChosenRows, Share
 from dmpcli.settings.batch import BatchOptions
 from dmpcli.surfaces.plane import Plane
 from dmpcli.workflows.generalize import Ready
 from dmpcli.workflows.process import SLOW, SPLIT
+from dmpcli.workflows.table_sites import TableSites
 
 
 def write(ready: Ready, output: Location, wanted: BatchOptions) -> None:
@@ -50,6 +56,7 @@ def write_pieces(
     output: Location,
     wanted: BatchOptions,
     alone: bool = False,
+    on: TableSites | None = None,
 ) -> None:
     """Draw a table piece by piece into a folder, and say what became of it.
 
@@ -63,6 +70,8 @@ def write_pieces(
     alone : bool
         Whether nothing but its own row decides what is drawn of a pair: then a shard reads and
         checks no rows but its own.
+    on : TableSites, optional
+        Where the table names surfaces.
 
     Raises
     ------
@@ -73,9 +82,13 @@ def write_pieces(
         wanted.pairs_per_part, pair_stream.ROWS // wanted.pairs_per_part * wanted.pairs_per_part
     )
     shard = Shard(*wanted.share)
-    whole = stream
-    if alone and not shard.whole:
-        stream = replace(stream, share=Share(wanted.pairs_per_part, shard.has))
+    whole, parts = stream, None
+    if alone and not shard.whole and on is None:
+        stream = stream.of_share(Share(wanted.pairs_per_part, shard.has), rows)
+    elif alone and on is not None and not shard.whole:
+        own = _rows_of(map(on.at, stream.places(rows)), shard, wanted)
+        if len(own.parts):
+            stream, parts = stream.of_share(own.rows, rows), own
     stream.check_ids(rows)
     if wanted.stop:
         with heard():  # it is told as they are drawn
@@ -102,7 +115,7 @@ def write_pieces(
             yield ready
 
     nested = stream.rows > MOST_IN_ONE * wanted.pairs_per_part
-    summary = _drawn(readies(), output, wanted, nested, stream.asked)
+    summary = _drawn(readies(), output, wanted, nested, stream.asked, parts)
     _tell(str(stream.path), output, shard, summary)
 
 
@@ -130,15 +143,57 @@ def draw_into(ready: Ready, output: Location, wanted: BatchOptions) -> BatchSumm
     return _drawn(iter([ready]), output, wanted, nested, len(table))
 
 
+@dataclass(frozen=True)
+class _OwnRows:
+    """The rows of a table that names surfaces of which a shard has the parts.
+
+    Attributes
+    ----------
+    rows : ChosenRows
+    parts : array of int, shape (k,)
+        Number of the part of each.
+    """
+
+    rows: ChosenRows
+    parts: Integers
+
+    def parts_of(self, numbers: Integers) -> Integers:
+        """Return the parts of some of the rows, by their numbers in the table."""
+        return self.parts[np.searchsorted(self.rows.numbers, numbers)]
+
+
+def _rows_of(pieces: Iterator[PairSites], shard: Shard, wanted: BatchOptions) -> _OwnRows:
+    """Cut a table by the sites of its pieces, as it is cut where all of it is drawn."""
+    numbers, parts, groups = [], [], []
+    row = part = 0
+    for sites in pieces:
+        cut = by_site(sites.of, sites.lift, wanted.pairs_per_part, wanted.surfaces_per_part)
+        own = np.flatnonzero(shard.has(cut.part + part))
+        numbers.append(own + row)
+        parts.append(cut.part[own] + part)
+        groups.append(len(own))
+        row, part = row + len(sites.of), part + cut.count
+    return _OwnRows(ChosenRows(np.concatenate(numbers), groups), np.concatenate(parts))
+
+
 def _drawn(
-    readies: Iterator[Ready], output: Location, wanted: BatchOptions, nested: bool, total: int
+    readies: Iterator[Ready],
+    output: Location,
+    wanted: BatchOptions,
+    nested: bool,
+    total: int,
+    own: _OwnRows | None = None,
 ) -> BatchSummary:
     with _workers(wanted) as draw_with, progress("drawing", total) as advance:
-        return run(_batches(readies, output, wanted, nested), draw_with, advance)
+        return run(_batches(readies, output, wanted, nested, own), draw_with, advance)
 
 
 def _batches(
-    readies: Iterator[Ready], output: Location, wanted: BatchOptions, nested: bool
+    readies: Iterator[Ready],
+    output: Location,
+    wanted: BatchOptions,
+    nested: bool,
+    own_rows: _OwnRows | None,
 ) -> Iterator[Batch]:
     """Yield what is to be drawn; all of it is one job, that of the first piece."""
     job: Job | None = None
@@ -147,6 +202,9 @@ def _batches(
         own = replace(_job(ready, output, wanted), nested=nested)
         if ready.sites is None and len(ready.table):
             first_part = int(ready.table.numbers[0]) // wanted.pairs_per_part
+        parts = None if own_rows is None else own_rows.parts_of(ready.table.numbers)
+        if parts is not None:
+            first_part = int(parts.min())
         if job is None:
             job = own
             _try(ready)
@@ -166,6 +224,7 @@ def _batches(
             ready.sites,
             wanted.surfaces_per_part,
             first_part,
+            parts,
         )
         first_part += batch.cut.count
         yield batch

@@ -4,8 +4,6 @@ What the words of the table can tell is checked before anything is drawn; a surf
 where its pairs are drawn, and what stands against it, or against pairs on it, is told by row.
 """
 
-import contextlib
-import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dmpcli.arrays import Floats
-from dmpcli.batch.site import PairSites, PreparedSite, Remark, Site, SiteFile
+from dmpcli.batch.site import PreparedSite, Remark, Site, SiteFile
 from dmpcli.batch.task import Task
 from dmpcli.dmp.copies import ends
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions, OnBorder
@@ -28,11 +26,9 @@ from dmpcli.records import file_io, learning_record, pose
 from dmpcli.records.file_io import Source
 from dmpcli.records.learned_skill import LearnedSkill
 from dmpcli.records.mesh_store import MeshStore
-from dmpcli.records.pair_places import PairPlaces, Place
 from dmpcli.records.pairs import PairTable
 from dmpcli.records.record import Provenance
 from dmpcli.records.schemas import OK
-from dmpcli.records.storage import Location, beside, located
 from dmpcli.settings.generalize import GeneralizeSettings
 from dmpcli.spatial.output_events import asked
 from dmpcli.spatial.pose import Pose
@@ -51,42 +47,21 @@ from dmpcli.workflows.generalize import (
 from dmpcli.workflows.generalize_inputs import facing_tool, in_base, reach_of, style_of
 from dmpcli.workflows.generalize_messages import mark, tell_of_stretch, tell_of_surface
 from dmpcli.workflows.surface_input import SurfaceInput, placed_input, store_in
-
-_POSE = "column 'pose'"
+from dmpcli.workflows.table_sites import POSE_COLUMN, TableSites
 
 _MOST_FACES = 100_000
 """Meshes of so many faces together are held for the next pairs on them."""
 
 
-@dataclass(frozen=True)
-class Otherwise:
-    """What the command line says where a table says nothing.
-
-    Attributes
-    ----------
-    surface : str or None
-    pose, unit : str or None
-    axes : {'base', 'part'}
-    """
-
-    surface: str | None = None
-    pose: str | None = None
-    unit: str | None = None
-    axes: str = "base"
-
-
-def prepared_sites(
-    order: Order, folder: Location, otherwise: Otherwise, cache: str | None = None
-) -> Ready:
+def prepared_sites(order: Order, named: TableSites, cache: str | None = None) -> Ready:
     """Check an order whose table names surfaces, as far as the table alone can tell.
 
     Parameters
     ----------
     order : Order
         Without a surface of its own.
-    folder : Path or ObjectPath
-        Of the table: its relative names start there.
-    otherwise : Otherwise
+    named : TableSites
+        What becomes of the table's words.
     cache : str, optional
         Folder of prepared meshes.
 
@@ -96,6 +71,7 @@ def prepared_sites(
         The skill cannot give what is asked; or a surface is missing and `Order.stop` holds.
     """
     skill, settings, table = order.skill, order.settings, order.table
+    otherwise = named.otherwise
     assert table.places is not None
     options = settings.as_options() | order.options | {"on_border": order.on_border}
     said = {
@@ -116,7 +92,7 @@ def prepared_sites(
     said_mark = mark(skill, skill.name)
     if said_mark is not None:
         warn(said_mark)
-    sites = sites_of(table, folder, otherwise, settings.offset)
+    sites = named.of(table)
     bad = np.flatnonzero(~table.good)
     if order.stop and len(bad):
         raise InputError(f"{table.name}: {table.status[bad[0]]}")
@@ -144,101 +120,6 @@ def _said_pose(given: str) -> list[float] | str:
     """Six numbers as they are, a pose file by its hash."""
     _, source = pose.parse(given, "--surface-pose")
     return [float(word) for word in given.split()] if source is None else source.sha256
-
-
-def sites_of(table: PairTable, folder: Location, otherwise: Otherwise, offset: float) -> PairSites:
-    """Make files of a table's words; what is wrong with them goes into the status of its rows.
-
-    Parameters
-    ----------
-    table : PairTable
-        With places.
-    folder : Path or ObjectPath
-        That relative names start from.
-    otherwise : Otherwise
-    offset : float
-        Where the table says none, mm.
-    """
-    places = table.places
-    assert places is not None
-    sites: list[Site] = []
-    number = np.full(len(places.places), -1)
-    for i, place in enumerate(places.places):
-        try:
-            site = _site(place, folder, otherwise, offset)
-        except InputError as error:
-            _mark(table, places, i, str(error))
-            continue
-        number[i] = len(sites)
-        sites.append(site)
-    return PairSites(sites, number[places.of])
-
-
-def _site(place: Place, folder: Location, otherwise: Otherwise, offset: float) -> Site:
-    if place.surface:
-        surface = _file(place.surface, folder)
-    elif otherwise.surface is not None:
-        given = located(otherwise.surface).absolute()
-        surface = SiteFile(str(given), given.name)
-    else:
-        raise InputError(
-            "says where a surface lies, but not which: name it in column 'surface', or for all "
-            "such rows with --surface"
-        )
-    at: SiteFile | str | None = None
-    if place.pose or otherwise.pose:
-        words = place.pose or otherwise.pose or ""
-        at = words if _begins_with_number(words) else _file(words, folder if place.pose else Path())
-        if isinstance(at, str):
-            pose.parse(at, _POSE if place.pose else "--surface-pose")
-    lift = offset if place.offset is None else place.offset
-    return Site(surface, place.unit or otherwise.unit, at, place.axes or otherwise.axes, lift)
-
-
-def _begins_with_number(words: str) -> bool:
-    try:
-        float(words.split()[0])
-    except (ValueError, IndexError):
-        return False
-    return True
-
-
-def _file(name: str, folder: Location) -> SiteFile:
-    """Return a file that must be there.
-
-    Raises
-    ------
-    InputError
-        It is not, or cannot be read.
-    """
-    path = beside(folder, name).absolute()
-    if not path.exists():
-        meant = _meant(name, folder)
-        raise InputError(
-            f"{name}: no such file; "
-            + (f"did you mean {meant}?" if meant else "names are relative to the table's folder")
-        )
-    if not path.is_file() or (isinstance(path, Path) and not os.access(path, os.R_OK)):
-        raise InputError(f"{name}: is no file that can be read")
-    return SiteFile(str(path), name)
-
-
-def _meant(name: str, folder: Location) -> str | None:
-    """Return a file of this machine that has the name but for slashes and capitals."""
-    if not isinstance(folder, Path):
-        return None
-    plain = Path(name.replace("\\", "/"))
-    with contextlib.suppress(OSError):
-        for one in sorted((folder / plain).parent.iterdir()):
-            if one.name.casefold() == plain.name.casefold():
-                return str(plain.with_name(one.name))
-    return None
-
-
-def _mark(table: PairTable, places: PairPlaces, i: int, why: str) -> None:
-    for row in np.flatnonzero(places.of == i).tolist():
-        if table.status[row] == OK:
-            table.status[row] = f"{table.place(row)}, pair {table.ids[row]}: {why}"
 
 
 class SurfaceReader:
@@ -276,10 +157,10 @@ class SurfaceReader:
                 source = site.pose.read()
                 at = pose.decode(source)[0], source
             elif site.pose is not None:
-                at = pose.parse(site.pose, _POSE)
+                at = pose.parse(site.pose, POSE_COLUMN)
             words = site.pose if isinstance(site.pose, str) else None
             read = placed_input(
-                site.surface.read(), words, at, site.unit, f"{name}, {_POSE}", self.store
+                site.surface.read(), words, at, site.unit, f"{name}, {POSE_COLUMN}", self.store
             )
         self._open[key] = read
         while len(self._open) > 1 and sum(map(_faces, self._open.values())) > _MOST_FACES:

@@ -279,7 +279,7 @@ def warn_of_speed(
     style : GeneralizeOptions
         Without a pace nothing is warned of.
     """
-    from dmpcli.batch.part import is_slow
+    from dmpcli.batch.settled import is_slow
     from dmpcli.dmp.tool_speed import held
 
     for name, stroke in zip(ids, strokes, strict=True):

@@ -17,8 +17,9 @@ from dmpcli.records.storage import Location
 from dmpcli.reporting.report_surface import ReportSurface
 from dmpcli.reporting.stroke_measures import Row
 from dmpcli.surfaces.mesh import Mesh
-from dmpcli.workflows.generalize_sites import Otherwise, SurfaceReader, sites_of
+from dmpcli.workflows.generalize_sites import SurfaceReader
 from dmpcli.workflows.surface_input import store_in
+from dmpcli.workflows.table_sites import Otherwise, TableSites
 
 
 class SiteGrounds:
@@ -48,7 +49,7 @@ class SiteGrounds:
                 "strokes give --surface alone"
             )
         folder = Path() if str(path) == file_io.DASH else path.parent
-        found = sites_of(table, folder, otherwise, 0.0)
+        found = TableSites(folder, otherwise).of(table)
         self.name, self.sha256 = source.name, source.sha256
         self._sites = found.sites
         self._of: dict[str, int] = dict(zip(table.ids, found.of.tolist(), strict=True))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmpcli.batch.part import settle
+from dmpcli.batch.settled import settle
 from dmpcli.dmp.contact_heights import end_heights
 from dmpcli.dmp.copies import ends as own_ends
 from dmpcli.dmp.feasibility import snapped

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dmpcli.arrays import Floats, Integers
-from dmpcli.batch.part import settle
+from dmpcli.batch.settled import settle
 from dmpcli.dmp.feasibility import snapped
 from dmpcli.dmp.generalization import draw
 from dmpcli.dmp.skill import Skill

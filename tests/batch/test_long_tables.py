@@ -1,6 +1,7 @@
 """A table that is drawn a piece at a time gives the parts of one that is drawn whole."""
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
@@ -123,3 +124,69 @@ def test_a_plane_seen_by_tools_of_the_table_is_seen_by_every_shard_as_by_all(
     for shard in ("2/3", "1/3", "3/3"):
         run(learned, tmp_path / "b", table, *options, "--shard", shard)
     assert parts_of(tmp_path / "b") == parts_of(tmp_path / "whole")
+
+
+def write_sites(path, rows, mixed):
+    """Pairs on eight planes, and on one that is not there, each with its own unit or stand-off."""
+    rng = np.random.default_rng(5)
+    start = np.column_stack([rng.uniform(-300, 300, (rows, 2)), np.zeros(rows)])
+    ends = np.hstack([start, start + [60.0, 20.0, 0.0]]).round(3)
+    ends[rows // 2, 3] = np.nan  # a pair that is none
+    of = np.arange(rows) * 9 // rows
+    of = rng.permutation(of) if mixed else of
+    path.with_name("plane.json").write_text(PLANE)
+    cells = {name: ends[:, i] for i, name in enumerate(("x0", "y0", "z0", "xg", "yg", "zg"))}
+    cells["surface"] = ["missing.json" if i == 4 else "plane.json" for i in of]
+    cells["pose"] = [f"0 0 {i} 0 0 0" for i in of]
+    cells["in"] = ["part"] * rows
+    cells["offset"] = [0.5 if i == 7 else 0.0 for i in of]
+    table = pa.table(cells)
+    if path.suffix == ".parquet":
+        pq.write_table(table, path, row_group_size=70)
+    else:
+        plain = pyarrow.csv.WriteOptions(quoting_style="none", quoting_header="none")
+        pyarrow.csv.write_csv(table, path, plain)
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join([*lines[:40], "# a comment", "", *lines[40:]]) + "\n")
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_shards_of_a_table_that_names_surfaces_draw_the_parts_of_the_whole(
+    learned, tmp_path, monkeypatch, kind, mixed
+):
+    monkeypatch.setattr(pair_stream, "STREAMED_ROWS", 0)
+    monkeypatch.setattr(pair_stream, "STREAMED", 0)
+    monkeypatch.setattr(pair_stream, "ROWS", 100)
+    table = write_sites(tmp_path / f"p.{kind}", 330, mixed)
+    few = (*SKIP, "--pairs-per-part", 20, "--surfaces-per-part", 2)
+    run(learned, tmp_path / "whole", table, *few)
+    for shard in ("2/3", "1/3", "3/3", "99/99"):  # the last has no part
+        run(learned, tmp_path / "b", table, *few, "--shard", shard)
+    assert len(parts_of(tmp_path / "whole")) > 12
+    assert parts_of(tmp_path / "b") == parts_of(tmp_path / "whole")
+    run(learned, tmp_path / "b", table, *few)
+    assert content(tmp_path / "b") == content(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_shard_of_a_table_that_names_surfaces_reads_nothing_else_of_others_rows(
+    learned, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(pair_stream, "STREAMED", 0)
+    monkeypatch.setattr(pair_stream, "ROWS", 100)
+    table = write_sites(tmp_path / "p.csv", 330, mixed=True)
+    seen, decoded = [], pair_stream.pairs.decoded
+
+    def noted(piece):
+        found = decoded(piece)
+        seen.append(found.numbers)
+        return found
+
+    monkeypatch.setattr(pair_stream.pairs, "decoded", noted)
+    few = (*SKIP, "--pairs-per-part", 20, "--surfaces-per-part", 2)
+    run(learned, tmp_path / "b", table, *few, "--shard", "1/5")
+    rows = np.unique(np.concatenate(seen[1:]))  # the first row tells the columns
+    assert 0 < len(rows) < 110

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dmpcli.batch import workers
-from dmpcli.batch.part import Job, Settled, settle
+from dmpcli.batch.part import Job
 from dmpcli.batch.run import Batch
+from dmpcli.batch.settled import Settled, settle
 from dmpcli.batch.task import Task
 from dmpcli.dmp.drawn_strokes import GeneralizeOptions
 from dmpcli.dmp.generalization import draw

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dmpcli.errors import InputError
-from dmpcli.records import pairs, tables
+from dmpcli.records import pairs
 from dmpcli.records.file_io import Source
 from dmpcli.records.pair_places import Place
 from dmpcli.records.pair_stream import PairStream
@@ -194,9 +194,70 @@ def test_columns_that_nobody_reads_are_known_but_not_those_of_our_own_tables():
     np.testing.assert_array_equal(found.pairs.start, [[1, 2, 3]])
 
 
-def test_a_piece_of_a_file_does_not_decide_what_its_commas_are():
-    cells = {name: pa.array(["1,5", "2,5"]) for name in ("x0", "y0", "z0", "xg", "yg", "zg")}
-    whole = tables.Table("t.csv", cells, lines=np.array([2, 3]))
-    piece = tables.Table("t.csv", cells, lines=np.array([2, 3]), rows=np.array([0, 1]))
-    assert pairs.decoded(whole).pairs.start[0, 0] == 1.5
-    assert all("x0" in status for status in pairs.decoded(piece).status)
+def test_a_piece_of_a_file_does_not_decide_what_its_commas_are(tmp_path):
+    """Its text is in one type or another, and another piece may have points."""
+    cells = {name: pa.array(["1,5", "2,25"]) for name in HEADER.split(",")}
+    whole, piece = both_ways(parquet(**cells), tmp_path)
+    assert whole.pairs.start[0, 0] == 1.5
+    assert all("x0" in status for status in piece.status)
+
+
+def said(text, name="t.csv"):
+    return pairs.read(Source(name, text.encode()))
+
+
+@pytest.mark.parametrize(
+    ("rows", "where", "either"),
+    [
+        # Excel in English quotes 1,234; another program quotes a decimal comma in the same way.
+        (['"1,234",0,0,"1,334",0,0'], "'x0', line 2", "1.234 or 1234"),
+        (["900,0,0,950,0,0", '950,0,0,"-1,050",0,0'], "'xg', line 3", "-1.050 or -1050"),
+        (['"1,234",0,0,"1,234,567",0,0'], "'x0', line 2", "1.234 or 1234"),
+        (["900;0;0;1,050;0;0"], "'xg', line 2", "1.050 or 1050"),
+    ],
+)
+def test_a_comma_that_may_part_thousands_is_refused(rows, where, either):
+    separator = ";" if ";" in rows[0] else ","
+    with pytest.raises(InputError, match=f"column {where}: .* may be {either}; write the numbers"):
+        said("\n".join([HEADER.replace(",", separator), *rows]))
+
+
+@pytest.mark.parametrize(
+    ("row", "x0"),
+    [
+        ('"0,234",0,0,"1,334",0,0', 0.234),
+        ('"12,5",0,0,"1,334",0,0', 12.5),
+        ("12,500;0,000;0,000;60,125;1,000;0,000", 12.5),
+        ("12,500;10,100;10,200;60,125;11,000;10,500", 12.5),
+    ],
+)
+def test_a_comma_that_can_only_be_a_decimal_sign_is_one(row, x0):
+    separator = ";" if ";" in row else ","
+    found = said(f"{HEADER.replace(',', separator)}\n{row}\n")
+    assert found.pairs.start[0, 0] == x0
+    assert found.remarks == ("commas between digits read as decimal signs",)
+
+
+def test_thousands_beside_points_are_bad_rows_by_name():
+    found = said(f'{HEADER}\n"1,234.5",0,0,9.5,0,0\n1,2.5,3,4,5,6\n')
+    assert found.status[0] == "line 2, column 'x0': '1,234.5' is not a finite number"
+    assert found.good.tolist() == [False, True]
+
+
+def test_truth_values_are_no_numbers():
+    truth = pa.array([True, False])
+    found = pairs.read(Source("p.parquet", parquet(duration=truth)))
+    assert "column 'duration': 'True' is not a positive time in s" in found.status[0]
+    assert not found.good.any()
+    found = pairs.read(Source("p.parquet", parquet(yg=truth)))
+    assert "column 'yg': 'True' is not a finite number" in found.status[0]
+
+
+@pytest.mark.parametrize("width", [6, 9])
+def test_text_in_bytes_of_one_width_is_text_and_bytes_that_are_none_stay(width, tmp_path):
+    """As numpy writes its own: padded with zeros."""
+    names = pa.array([name.ljust(width, b"\0") for name in (b"a.stl", b"bc.stl")], pa.binary(width))
+    for found in both_ways(parquet(surface=names), tmp_path):
+        assert [place.surface for place in found.places.places] == ["a.stl", "bc.stl"]
+    key = pa.array([b"\xff" * 16, b"\xfe" * 16], pa.binary(16))
+    assert pairs.read(Source("p.parquet", parquet(key=key))).good.all()

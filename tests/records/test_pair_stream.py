@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from dmpcli.errors import InputError
 from dmpcli.records import file_io, pair_stream, pairs
+from dmpcli.records.table_shares import ChosenRows, Share
 
 HEADER = "id,x0,y0,z0,xg,yg,zg,surface,colour"
 
@@ -112,7 +113,7 @@ def test_short_tables_are_read_whole(tmp_path, monkeypatch):
 
 
 def share_of(path, size, index, count):
-    share = pair_stream.Share(size, lambda part: part % count == index)
+    share = Share(size, lambda part: part % count == index)
     return replace(pair_stream.opened(path), share=share)
 
 
@@ -180,3 +181,23 @@ def test_lines_of_others_are_counted_not_parted_and_messages_name_the_files_line
     path = write(tmp_path / "p.csv", ["# a comment", *lines])
     with pytest.raises(InputError, match="line 12 has 10 columns"):
         list(share_of(path, 2, 0, 4).pieces(2))
+
+
+@given(st.data())
+def test_chosen_rows_are_told_like_those_of_a_share_and_groups_stay_together(data):
+    numbers = np.flatnonzero(data.draw(st.lists(st.booleans(), min_size=1, max_size=60)))
+    groups, left = [], len(numbers)
+    while left:
+        groups.append(data.draw(st.integers(0, min(left, 7))))
+        left -= groups[-1]
+    chosen = ChosenRows(numbers, groups)
+    begin, end = sorted(data.draw(st.tuples(st.integers(0, 60), st.integers(0, 60))))
+    here = [n for n in numbers.tolist() if begin <= n < end]
+    assert chosen.rows(begin, end).tolist() == here
+    assert chosen.count(end) - chosen.count(begin) == len(here)
+    sizes, taken, ends = chosen.pieces(8), 0, {0, *np.cumsum(groups).tolist()}
+    while taken < len(numbers):
+        size = next(sizes)
+        assert 0 < size <= 8
+        taken += size
+        assert taken >= len(numbers) or taken in ends
