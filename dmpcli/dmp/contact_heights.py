@@ -18,6 +18,9 @@ CONTACT = 1.0
 NOISE = 5.0
 # Touching parts of less than this share of the path tell no offset.
 _TELLING = 0.05
+# An offset is constant where this part of what touches is within a share of the band of it, or of
+# itself: heights that an arch goes through have a median too.
+_ALIKE, _OF_BAND, _OF_ITSELF = 0.9, 0.1, 0.25
 # Samples of the stroke that are judged.
 _SAMPLES = 2001
 
@@ -31,7 +34,7 @@ class ContactHeights:
     band : float
         Within it the pen touches, mm; 0 draws every w as it is.
     removed : float
-        Mean height of the touching parts, which is taken off, mm.
+        Height of the touching parts where it is constant, which is taken off, mm.
     offset : float
         Asked for on purpose: stand-off positive, engraving negative, mm.
     depth : float
@@ -85,7 +88,10 @@ def contact_heights(skill: Skill, contact: float | None, offset: float = 0.0) ->
     near = np.abs(w) <= contact
     removed = 0.0
     if contact > 0.0 and share[near].sum() > _TELLING:
-        removed = _weighted_median(w[near], share[near])
+        removed = _weighted_quantile(w[near], share[near], 0.5)
+        apart = _weighted_quantile(np.abs(w[near] - removed), share[near], _ALIKE)
+        if apart > max(_OF_BAND * contact, _OF_ITSELF * abs(removed)):
+            removed = 0.0
     drawn = _drawn(w - removed, contact)
     touching: Booleans = np.abs(w - removed) <= max(contact, 1e-6)
     # On purpose is what the offset takes down; a stand-off lifts what would dig in.
@@ -153,7 +159,7 @@ def _drawn(w: Floats, band: float) -> Floats:
     return smooth * w
 
 
-def _weighted_median(values: Floats, weights: Floats) -> float:
+def _weighted_quantile(values: Floats, weights: Floats, part: float) -> float:
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(reached, 0.5 * reached[-1])])
+    return float(values[order][np.searchsorted(reached, part * reached[-1])])

@@ -3,10 +3,11 @@
 Least-squares splines of degree 5. The number of uniform intervals K is the one of least expected
 error by Mallows' Cp (C. L. Mallows, Technometrics 15, 1973) over a ladder × 2^(1/4). What the whole
 decides can be wrong in one place: where noise does not explain the residual, as at a corner,
-intervals are halved there and only there.
+intervals are halved there and only there. Last of all the acceleration is lowered wherever what is
+drawn of it may be the noise's (`least_acceleration`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from dmpcli.dmp.corner_pieces import COST
 from dmpcli.dmp.cornered import Cornered, cornered
 from dmpcli.dmp.flat_directions import moving_axes
 from dmpcli.dmp.knot_refinement import ROUNDING
+from dmpcli.dmp.least_acceleration import calmed
 from dmpcli.dmp.least_squares import DEGREE, Design
 from dmpcli.dmp.noise import FEWEST, Noise
 from dmpcli.dmp.spline_ends import MANY, end, with_ends
@@ -139,18 +141,25 @@ def smooth(
         fitted = design, design.coefficients(moving)
         if cutoff is None:
             fitted = knot_refinement.refined(*fitted, moving, inside, variance)
-    if cutoff is None and not resampled and not _is_rounding(noise, x):
+    judged = cutoff is None and not resampled and not _is_rounding(noise, x)
+    if judged:
         # Through all samples there is nothing left, and as many coefficients.
         cost = COST * count if fitted is None else knot_refinement.cost(*fitted, moving, variance)
         corners = cornered(moving, inside, variance, cost, fitted and fitted[0])
         if corners is not None:
-            return _between_corners(centred, middle, axes, duration, noise, inside, corners)
+            calm = calmed(moving, corners.values, inside)
+            corners = corners if calm is None else replace(corners, values=calm)
+            return _through(centred, middle, axes, duration, noise, inside, corners)
     if K is None or fitted is None:
         return _interpolating(x, duration, noise, resampled)
     design, c = fitted
     rests = (False, False)
     if cutoff is None:
         c, rests = with_ends(design, c, variance)
+    calm = calmed(moving, design.values(c), inside) if judged else None
+    if calm is not None:
+        found = Cornered(calm, np.zeros(0), float(design.intervals), K / (count - 1.0), rests)
+        return _through(centred, middle, axes, duration, noise, inside, found)
     c = c @ axes.T
     residual = centred - design.values(c)
     from scipy.interpolate import BSpline
@@ -166,7 +175,7 @@ def smooth(
     )
 
 
-def _between_corners(
+def _through(
     centred: Floats,
     middle: Floats,
     axes: Floats,

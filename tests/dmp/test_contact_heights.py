@@ -41,6 +41,21 @@ def test_what_is_near_everywhere_is_drawn_in_contact(height):
     assert np.all(found.drawn(np.full(5, height)) == 0.0)
 
 
+@pytest.mark.parametrize("height", [-0.9, 0.6, 0.95, 2.0, 6.0])
+def test_an_arch_is_nowhere_at_an_offset(height):
+    """Heights of all sizes, of which none is constant: their median was taken for one."""
+    arch = height * np.sin(np.pi * np.linspace(0.0, 1.0, 601))
+    assert contact_heights(taught(arch), None).removed == 0.0
+
+
+@pytest.mark.parametrize("tilt", [0.05, 0.15])
+def test_an_offset_that_leans_a_little_is_one(tilt):
+    leaning = 0.8 + tilt * np.linspace(-1.0, 1.0, 601)
+    found = contact_heights(taught(leaning), None)
+    assert found.removed == pytest.approx(0.8, abs=0.02)
+    assert found.touching == pytest.approx(1.0)
+
+
 def test_a_lifted_part_keeps_its_height_above_the_offset_of_the_rest():
     found = contact_heights(taught(0.4 + bump(8.0)), None)
     assert found.removed == pytest.approx(0.4, abs=0.02)

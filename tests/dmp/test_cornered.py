@@ -65,12 +65,13 @@ def test_a_zigzag_is_as_near_at_its_corners_as_asked(sigma):
 @pytest.mark.sweep(kept=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [40.0, 100.0, 400.0])
-def test_any_polyline_is_kept_within_twice_its_noise(rate):
+def test_any_polyline_is_kept_within_three_times_its_noise(rate):
+    """Four times is asked: within that a corner is rounded as far as the samples do not object."""
     for seed in range(300, 306):
         t, truth = polyline(seed, rate)
         spline = smoothed(t, noisy(truth, 0.05, seed))
         e = off(spline, t, truth, 0.05)
-        assert e.max() <= 2.0
+        assert e.max() <= 3.0
         assert np.sqrt(np.mean(e**2)) <= 0.6
         assert spline.corners >= 1
 
