@@ -39,10 +39,11 @@ ifneq ($(words $(VENV) $(OUT)),2)
 $(error VENV and OUT may not have spaces in their names: make cannot tell them from two)
 endif
 
-# A shell that was set up for something else (ROS, for one) would mix its packages into ours. An
+# A shell that was set up for something else (ROS, for one) would mix its packages into ours, take the
+# tests' folder off the path, their asserts out, or pytest's plugins away. An
 # environment is made without byte code, which is kept as modules are used: without it, every process
 # and every run of the tests would compile numpy, scipy and the tests anew.
-unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE PYTHONSAFEPATH PYTHONOPTIMIZE PYTEST_DISABLE_PLUGIN_AUTOLOAD
 export RUFF_CACHE_DIR := $(CACHE)/ruff
 export MYPY_CACHE_DIR := $(CACHE)/mypy
 

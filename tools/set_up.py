@@ -10,7 +10,9 @@ INDEX too where the index at hand does not do.
 
 import contextlib
 import fcntl
+import functools
 import hashlib
+import importlib
 import importlib.util
 import json
 import os
@@ -30,16 +32,39 @@ OURS = {"installed", LOG, "pyvenv.cfg"}
 """Any of these says that a folder is an environment and may be emptied."""
 
 NAME = f"CPython {platform.python_version()}"
-# What a user's shell or pip.conf may say, and what must not reach pip in an environment: PIP_USER
-# ends in "Can not perform a '--user' install" (pip issue 8977), a target or prefix goes elsewhere.
-QUIET = (
-    "PIP_TARGET",
-    "PIP_PREFIX",
-    "PIP_ROOT",
-    "PIP_REQUIRE_VIRTUALENV",
-    "PYTHONPATH",
-    "PYTHONHOME",
-)
+# What a user's shell says to Python, and must not reach it in an environment.
+QUIET = ("PYTHONPATH", "PYTHONHOME", "PYTHONSAFEPATH", "PYTHONOPTIMIZE", "FORCE_COLOR")
+
+# What of a user's pip.conf and PIP_... reaches pip there: where packages come from, and how. Else
+# user = true ends in "Can not perform a '--user' install" (pip issue 8977), another Python, target,
+# prefix or root goes elsewhere, and constraints or hashes contradict the lock.
+REACHES = {
+    *("index-url", "extra-index-url", "no-index", "find-links", "trusted-host", "proxy"),
+    *("cert", "client-cert", "keyring-provider", "use-feature", "use-deprecated"),
+    *("cache-dir", "no-cache-dir", "timeout", "default-timeout", "retries", "resume-retries"),
+}
+
+# pip config list takes user = true for its own option --user, and tells of one file alone.
+READ = """
+import json, sys
+from pip._internal.configuration import Configuration
+from pip._internal.exceptions import PipError
+try:
+    found = Configuration(isolated=False)
+    found.load()
+except PipError as error:
+    sys.exit("error: " + " ".join(str(error).split()))
+print(json.dumps([(name, str(value)) for name, value in found.items()]))
+"""
+
+COMPILED = {
+    "ssl": "libssl-dev",
+    "zlib": "zlib1g-dev",
+    "ctypes": "libffi-dev",
+    "bz2": "libbz2-dev",
+    "lzma": "liblzma-dev",
+}
+"""Modules that a Python which was built without these of Debian's packages does not have."""
 
 UNREACHED = (
     "NewConnectionError|NameResolutionError|ConnectTimeoutError|ReadTimeoutError|ProxyError"
@@ -57,8 +82,8 @@ def main(venv: Path, lock: Path, out: Path, mode: str = "", index: str = "") -> 
     if sys.prefix != sys.base_prefix and Path(sys.prefix).resolve() == venv.resolve():
         # Called by the environment's own Python: one that is about to be made anew cannot do it.
         os.execv(base(), [base(), *sys.argv])
-    for folder in (venv, out):
-        writable(folder)
+    for folder, option in ((venv, "VENV"), (out, "OUT")):
+        writable(folder, option)
     wanted = {
         "python": f"{sys.version} {sys.base_prefix}",
         "place": str(venv.resolve()),
@@ -76,6 +101,7 @@ def main(venv: Path, lock: Path, out: Path, mode: str = "", index: str = "") -> 
             packages(venv, lock, mode, index)
         if not mode:
             project(venv)
+            works(venv)
         (venv / "installed").write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
 
 
@@ -104,13 +130,19 @@ def installed_files() -> list[Path]:
     return sorted(p for p in (ROOT / "dmpcli").rglob("*") if p.is_file() and p.suffix != ".pyc")
 
 
-def writable(folder: Path) -> None:
+def writable(folder: Path, option: str) -> None:
     """Make a folder, and make sure that it can be written.
 
     Raises
     ------
     SetUpError
     """
+    if os.path.lexists(folder) and not folder.is_dir():
+        what = "a file" if folder.exists() else "a link that leads nowhere"
+        raise SetUpError(
+            f"{folder} is {what}, and a folder is needed: move it, or name another as make ... "
+            f"{option}=DIR"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -164,6 +196,20 @@ def fresh(venv: Path) -> None:
             f"{base()} ({NAME}) comes without its module {missing[0]}: on Debian and Ubuntu "
             f"sudo apt install {package} (or python3-venv); or name another: make ... PYTHON=..."
         )
+    for module, needed in COMPILED.items():
+        try:
+            importlib.import_module(module)
+        except ImportError:
+            raise SetUpError(
+                f"{base()} ({NAME}) was built without its module {module}: install what it needs "
+                f"(Debian and Ubuntu: {needed}) and build it again, as pyenv install does; or name "
+                "another: make ... PYTHON=..."
+            ) from None
+    if os.pathsep in str(venv.resolve()):
+        raise SetUpError(
+            f"{venv.resolve()}: no environment can lie in a folder with {os.pathsep!r} in its name:"
+            " rename it, or name another as make ... VENV=DIR"
+        )
     # First of all, so that an interrupted run leaves what the next one knows as ours.
     (venv / LOG).touch()
     for path in venv.iterdir():
@@ -172,7 +218,10 @@ def fresh(venv: Path) -> None:
         shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
     done = run(venv, base(), "-m", "venv", str(venv))
     if done:
-        raise SetUpError(f"{NAME} makes no environment: {last_line(done)}")
+        raise SetUpError(
+            f"{NAME} makes no environment: {last_line(done)}; name another Python as make ... "
+            f"PYTHON=... (all of its words: {venv / LOG})"
+        )
 
 
 def packages(venv: Path, lock: Path, mode: str, index: str) -> None:
@@ -208,6 +257,27 @@ def project(venv: Path) -> None:
         pip(venv, *more, "--force-reinstall", str(copy))
 
 
+def works(venv: Path) -> None:
+    """Make sure that what was installed can be run.
+
+    Raises
+    ------
+    SetUpError
+    """
+    try:
+        done = run(venv, str(venv / "bin/dmpcli"), "--version")
+    except PermissionError:
+        raise SetUpError(
+            f"{venv} lies where no program may be run (a disk that is mounted noexec): name a "
+            "place elsewhere as make ... VENV=DIR"
+        ) from None
+    if done:
+        raise SetUpError(
+            f"dmpcli was installed and does not run: {last_line(done)} (all of its words: "
+            f"{venv / LOG})"
+        )
+
+
 def pip(venv: Path, *words: str) -> None:
     """Run ``pip install``; its words go to the log.
 
@@ -216,15 +286,48 @@ def pip(venv: Path, *words: str) -> None:
     SetUpError
     """
     options = ("--quiet", "--disable-pip-version-check", "--no-input", "--retries", "3")
-    said = run(venv, str(venv / "bin/python"), "-m", "pip", "install", *options, *words)
+    said = run(
+        venv, str(venv / "bin/python"), "-m", "pip", "install", *options, *words,
+        settings=pip_settings(venv),
+    )  # fmt: skip
     if said:
         raise SetUpError(f"{why(said)} (all of pip's words: {venv / LOG})")
 
 
-def run(venv: Path, *command: str) -> str:
-    """Run a command and log it; return what it said where it failed, else nothing."""
+@functools.cache
+def pip_settings(venv: Path) -> tuple[tuple[str, str], ...]:
+    """Return those of pip's settings that reach it, as variables of its environment.
+
+    Raises
+    ------
+    SetUpError
+    """
     environment = {name: value for name, value in os.environ.items() if name not in QUIET}
-    environment |= {"PIP_USER": "0", "PYTHONUTF8": "1"}
+    ask = [str(venv / "bin/python"), "-c", READ]
+    done = subprocess.run(ask, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = last_line(done.stderr or f"it ended with {done.returncode}")
+        raise SetUpError(f"pip's settings cannot be read: {said}; mend pip.conf")
+    found = {}
+    for order in ("global", "install", ":env:"):
+        for name, value in json.loads(done.stdout):
+            section, _, key = name.partition(".")
+            if section == order and key in REACHES:
+                found["PIP_" + key.upper().replace("-", "_")] = " ".join(value.split())
+    return tuple(found.items())
+
+
+def run(venv: Path, *command: str, settings: tuple[tuple[str, str], ...] = ()) -> str:
+    """Run a command and log it; return what it said where it failed, else nothing.
+
+    Of pip's settings only those that are given reach it.
+    """
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in QUIET and not name.startswith("PIP_")
+    }
+    environment |= dict(settings) | {"PIP_CONFIG_FILE": os.devnull, "PYTHONUTF8": "1"}
     done = subprocess.run(
         command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, encoding="utf-8", errors="replace", check=False,
@@ -239,6 +342,11 @@ def why(said: str) -> str:
     if "No space left on device" in said:
         return (
             "the disk is full: an environment takes about 1 GB; name a place as make ... VENV=DIR"
+        )
+    if re.search("certificate (is not yet valid|has expired)", said):
+        return (
+            "the package index's certificate is of another time than this machine's clock: check "
+            "the date, else the index"
         )
     if "CERTIFICATE_VERIFY_FAILED" in said:
         return (

@@ -86,7 +86,15 @@ def whole(tmp_path_factory):
     folder.mkdir(parents=True)
     place = Place(folder)
     shell = {"LC_ALL": "C", "LANG": "C", "HOME": "/dev/null/home"}
-    shell |= {"PIP_USER": "1", "PIP_TARGET": str(folder / "elsewhere")}
+    # As people have them, in pip.conf and in their shells.
+    elsewhere = folder / "elsewhere"
+    settings = ["[global]", "python = /usr/bin/python3", "user = true", "[install]"]
+    settings += [f"target = {elsewhere}", f"prefix = {elsewhere}", f"root = {elsewhere}"]
+    settings += ["require-hashes = true", "require-virtualenv = true", "dry-run = true"]
+    (folder / "pip.conf").write_text("\n".join(settings) + "\n")
+    (folder / "no.txt").write_text("pip<1\n")
+    shell |= {"PIP_CONFIG_FILE": str(folder / "pip.conf"), "PIP_CONSTRAINT": str(folder / "no.txt")}
+    shell |= {"PIP_USER": "1", "PIP_TARGET": str(elsewhere), "PIP_PYTHON": "/usr/bin/python3"}
     how = {"cwd": folder, "env": place.environment | shell, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(place.command(), start_new_session=True, **how) as running:
         while not (place.venv / "set-up.log").exists():
@@ -151,6 +159,83 @@ def test_a_python_without_venv_is_one_line_with_debians_package(place, module):
 def test_a_place_that_cannot_be_written_is_one_line(place, venv):
     assert "cannot be written" in place.refused(venv)
     assert "VENV=DIR OUT=DIR" in place.refused(venv)
+
+
+def test_a_file_where_the_folder_should_be_is_named_with_its_option(place):
+    place.venv.touch()
+    assert "is a file, and a folder is needed: move it, or name another as" in place.refused()
+    place.venv.unlink()
+    place.venv.symlink_to("nowhere/at/all")
+    assert "is a link that leads nowhere" in place.refused()
+    place.venv.unlink()
+    (place.folder / "out").touch()
+    assert "OUT=DIR" in place.refused()
+
+
+def test_a_python_that_was_built_without_a_module_is_told_with_what_it_needs(place):
+    said = place.refused(**place.python_without("ssl"))
+    assert (
+        "was built without its module ssl: install what it needs (Debian and Ubuntu: libssl-dev"
+        in said
+    )
+
+
+def test_a_folder_that_no_environment_can_lie_in_is_told(place):
+    assert "in a folder with ':' in its name" in place.refused("a:b")
+
+
+def test_where_no_program_may_be_run_it_is_told(set_up, tmp_path):
+    program = tmp_path / "bin" / "dmpcli"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o644)
+    with pytest.raises(set_up.SetUpError, match="no program may be run"):
+        set_up.works(tmp_path)
+    program.write_text('#!/bin/sh\necho "ImportError: libz.so.1" >&2; exit 1\n')
+    program.chmod(0o755)
+    with pytest.raises(set_up.SetUpError, match=r"does not run: ImportError: libz\.so\.1"):
+        set_up.works(tmp_path)
+
+
+def test_of_pips_settings_only_where_packages_come_from_reaches_it(whole, set_up, monkeypatch):
+    said = {
+        "[global]": ["user = true", "cert = /c.pem", "find-links =", "  /one", "  /two"],
+        "[install]": ["target = /elsewhere", "index-url = https://mirror/simple"],
+        "[wheel]": ["index-url = https://not"],
+    }
+    file = whole.folder / "other.conf"
+    file.write_text("\n".join(line for head, lines in said.items() for line in (head, *lines)))
+    for name in [name for name in os.environ if name.startswith("PIP_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(file))
+    monkeypatch.setenv("PIP_CERT", "/d.pem")
+    monkeypatch.setenv("PIP_PYTHON", "/usr/bin/python3")
+    found = dict(set_up.pip_settings.__wrapped__(whole.venv))
+    assert found["PIP_CERT"] == "/d.pem"
+    assert found["PIP_FIND_LINKS"] == "/one /two"
+    assert found["PIP_INDEX_URL"] == "https://mirror/simple"
+    assert not {"PIP_USER", "PIP_TARGET", "PIP_PYTHON"} & set(found)
+    file.write_text("index-url = x\n")
+    with pytest.raises(set_up.SetUpError, match=r"settings cannot be read: .*other\.conf"):
+        set_up.pip_settings.__wrapped__(whole.venv)
+
+
+def test_a_certificate_of_another_time_is_told_as_the_clocks(set_up):
+    said = "SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED] certificate "
+    assert "clock: check the date" in set_up.why(
+        said + "verify failed: certificate is not yet valid"
+    )
+    assert "PIP_CERT=FILE" in set_up.why(said + "verify failed: self-signed certificate")
+
+
+def test_git_leaves_the_ends_of_lines_as_they_are():
+    """Where core.autocrlf is set, a shell would not run what it checks out."""
+    root = TOOLS.parent
+    if (root / ".git").exists():
+        ask = ["git", "check-attr", "text", "Makefile", "tools/set_up.sh", "sample_runs/pairs.csv"]
+        told = subprocess.run(ask, cwd=root, capture_output=True, text=True, check=True).stdout
+        assert told.count("text: unset") == 3
+    assert "* -text" in (root / ".gitattributes").read_text().splitlines()
 
 
 def test_a_folder_that_holds_something_else_is_not_emptied(place):
