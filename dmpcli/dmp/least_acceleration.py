@@ -43,13 +43,16 @@ _POWER, _ITERATIONS, _TOGETHER, _PASSED, _PASSED_AT_LAST, _MISSING = 1.5, 60, 6,
 _AVERAGED = 1.0 / 6.0
 # Second differences that may change together, from which on means of some are taken.
 _FINE = 64
+# Deviations of a spline's acceleration that noise does not reach, and intervals from an end
+# beyond which they are alike.
+_CERTAIN, _END = 5.0, 2.0
 # Samples up to which it is asked.
 _LONGEST = 50_000
 # Holds where nothing may change.
 _HELD = 1e30
 
 
-def calmed(x: Floats, values: Floats, noise: Noise) -> Floats | None:
+def calmed(x: Floats, values: Floats, noise: Noise, width: float | None = None) -> Floats | None:
     """Lower the acceleration wherever it may be that of noise; None where it is nowhere.
 
     Parameters
@@ -60,6 +63,9 @@ def calmed(x: Floats, values: Floats, noise: Noise) -> Floats | None:
         What they are without their noise.
     noise : Noise
         Of the samples. Of any but white noise a sample says little of its own, and nothing is done.
+    width : float, optional
+        Samples in an interval, where the values are those of a spline whose intervals are alike:
+        how much of its acceleration is noise is known then, but for the ends.
 
     Returns
     -------
@@ -70,6 +76,13 @@ def calmed(x: Floats, values: Floats, noise: Noise) -> Floats | None:
     sigma = noise.typical
     calm, done = values, np.zeros(len(values) - 2, dtype=bool)
     bends = given = np.diff(values, 2, axis=0)
+    if width is not None:
+        # Of white noise a low-pass leaves ∫ (2 π f)⁴ df up to half a cycle an interval.
+        deviation = sigma * float(np.sqrt(bends.shape[1] * np.pi**4 / (5.0 * width**5)))
+        peak = float(np.sqrt(np.einsum("td,td->t", bends, bends).max(initial=0.0)))
+        if _CERTAIN * deviation < (1.0 - 1.0 / _DOUBTFUL) * peak:
+            end = int(np.ceil(_END * width))
+            done[end : len(done) - end] = True
     for _ in range(_ROUNDS):
         places = _places(bends, given, done, sigma)
         if not places:
@@ -166,7 +179,7 @@ def _limit(given: Floats, window: slice) -> float:
     at = int(np.argmax(squares))
     along = part @ part[at] / max(float(squares[at]), 1e-300)
     swings = np.sign(along[np.abs(along) > _SWING])
-    return _LIMIT + _SWUNG * part.shape[1] * int(np.count_nonzero(np.diff(swings)))
+    return float(_LIMIT + _SWUNG * part.shape[1] * np.count_nonzero(np.diff(swings)))
 
 
 def _above(sizes: Floats, at: int, cap: float) -> tuple[int, int]:
@@ -182,7 +195,7 @@ def _fewest(bends: Floats, low: int, high: int, at: int, cap: float) -> float:
     s = np.linspace(-1.0, 1.0, high - low + 2)[1:-1]
     bump = (1.0 - s**2) ** 2
     over = max(0.0, float(bump @ along) - cap * float(bump.sum()))
-    return over**2 / float(np.sum(_second(bump[:, None]) ** 2))
+    return float(over**2 / np.sum(_second(bump[:, None]) ** 2))
 
 
 def _lowered(

@@ -156,7 +156,8 @@ def smooth(
     rests = (False, False)
     if cutoff is None:
         c, rests = with_ends(design, c, variance)
-    calm = calmed(moving, design.values(c), inside) if judged else None
+    width = (count - 1) / design.intervals if design.uniform else None
+    calm = calmed(moving, design.values(c), inside, width) if judged else None
     if calm is not None:
         found = Cornered(calm, np.zeros(0), float(design.intervals), K / (count - 1.0), rests)
         return _through(centred, middle, axes, duration, noise, inside, found)

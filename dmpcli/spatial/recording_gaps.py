@@ -24,12 +24,14 @@ def inside(t: Floats, start: float | None, until: float | None) -> slice:
         What is beyond a gap before or after them is left out; a gap between them is inside.
     """
     steps = np.diff(t)
-    gaps = np.flatnonzero(steps > LONGEST_GAP * np.median(steps)) if len(steps) else []
+    gaps: list[int] = []
+    if len(steps):
+        gaps = np.flatnonzero(steps > LONGEST_GAP * np.median(steps)).tolist()
     first, stop = 0, len(t)
     for at in gaps:
         if start is not None and t[at] - t[0] < start:
-            first = int(at) + 1
+            first = at + 1
         elif until is not None and t[at + 1] - t[0] > until:
-            stop = int(at) + 1
+            stop = at + 1
             break
     return slice(first, stop)
