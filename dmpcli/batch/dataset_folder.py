@@ -6,9 +6,9 @@ with the same inputs and options goes on from them: each part's metadata say wha
 
 import contextlib
 import json
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyarrow as pa
@@ -131,7 +131,7 @@ class Folder:
         for stale in self.path.glob(f".{file_io.TABLE}.*.tmp") if parts is None else ():
             if stale != but:
                 remove_abandoned(stale)
-        for folder in file_io.part_folders(self.path):
+        for folder in cast(Sequence[Path], file_io.part_folders(self.path)):
             inner = "" if folder == self.path else f"{folder.name}/"
             for half in folder.glob(_TEMPORARY):
                 of = f"{inner}{half.name[1:].split('.parquet.')[0]}.parquet"
