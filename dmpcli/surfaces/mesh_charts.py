@@ -112,7 +112,7 @@ class MeshCharts:
         face, stretch = np.full(shape[:2], -1), np.ones(shape[:2])
         unfolded = self.creased & (status == Status.DRAWN)
         smooth = np.flatnonzero((status == Status.DRAWN) & ~self.creased)
-        every = len(smooth) == len(axes)
+        every = 0 < len(smooth) == len(axes)
         if not every:
             foot = np.repeat(self.centre.origin[:, None], shape[1], axis=1)
             axes[:] = np.eye(3)
