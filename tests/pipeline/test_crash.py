@@ -140,7 +140,9 @@ def test_ctrl_c_ends_a_recording_and_a_second_one_at_once(tmp_path, count):
         path = tmp_path / "demo.parquet.journal"
         deadline = time.monotonic() + 60.0
         # Two writings: the recording has rows.
-        while time.monotonic() < deadline and (not path.exists() or path.stat().st_size < 20_000):
+        while not path.exists() or path.stat().st_size < 20_000:
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < deadline
             time.sleep(0.02)
         for _ in range(count):
             process.send_signal(signal.SIGINT)
