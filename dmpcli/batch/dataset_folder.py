@@ -135,7 +135,7 @@ class Folder:
             inner = "" if folder == self.path else f"{folder.name}/"
             for half in folder.glob(_TEMPORARY):
                 of = f"{inner}{half.name[1:].split('.parquet.')[0]}.parquet"
-                if isinstance(half, Path) and (parts is None or of in parts):
+                if parts is None or of in parts:
                     remove_abandoned(half)
 
     def _outcome(self, name: str, number: int) -> Outcome | None:
