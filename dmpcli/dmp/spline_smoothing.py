@@ -44,6 +44,8 @@ _SIGNIFICANT = 1.0
 _CLIP = 3.0
 # Part of the stroke's acceleration below which that of noise is not worth smoothing.
 _NEGLIGIBLE = 1e-3
+# Part of the highest speed below which an end may rest.
+_STILL = 0.1
 # Points of the shape-preserving curve for each sample.
 _SHAPED = 4
 
@@ -148,7 +150,9 @@ def smooth(
         corners = cornered(moving, inside, variance, cost, fitted and fitted[0])
         if corners is not None:
             calm = calmed(moving, corners.values, inside)
-            corners = corners if calm is None else replace(corners, values=calm)
+            if calm is not None:
+                rests = _still(corners.rests, calm)
+                corners = replace(corners, values=calm, rests=rests)
             return _through(centred, middle, axes, duration, noise, inside, corners)
     if K is None or fitted is None:
         return _interpolating(x, duration, noise, resampled)
@@ -159,6 +163,7 @@ def smooth(
     width = (count - 1) / design.intervals if design.uniform else None
     calm = calmed(moving, design.values(c), inside, width) if judged else None
     if calm is not None:
+        rests = _still(rests, calm)
         found = Cornered(calm, np.zeros(0), float(design.intervals), K / (count - 1.0), rests)
         return _through(centred, middle, axes, duration, noise, inside, found)
     c = c @ axes.T
@@ -174,6 +179,13 @@ def smooth(
         float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))),
         rests,
     )
+
+
+def _still(rests: tuple[bool, bool], calm: Floats) -> tuple[bool, bool]:
+    """Whether ends rest still: one that goes on, less accelerated, would stop within a sample."""
+    steps = np.linalg.norm(np.diff(calm, axis=0), axis=1)
+    slow = _STILL * float(steps.max())
+    return rests[0] and bool(steps[0] <= slow), rests[1] and bool(steps[-1] <= slow)
 
 
 def _through(
