@@ -68,9 +68,10 @@ setup: $(VENV)/installed
 # cases but a few. A file's tests stay in one process, so that what they share is made once. Rules
 # are looked at meanwhile; types, which mypy takes a minute and a half for in a clone that is new,
 # are a step of their own. Some tests wait in real time: so there are three processes to two cores,
-# and of the thorough, which wait most, four; WORKERS=N chooses. In a clone that is new one process
-# makes the asserts of all tests ready, not each; and linear algebra has one thread in each, since
-# those of three processes would wait for one another, a tenth of the processor's time.
+# and of the thorough, which wait most, four; WORKERS=N chooses. In a clone that is new two processes
+# make the asserts of half of the tests ready each, not all of them those of all; and linear algebra
+# has one thread in each, since those of three processes would wait for one another, a tenth of the
+# processor's time.
 
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -o cache_dir=$(CACHE)/pytest
@@ -78,7 +79,9 @@ MANY  := --dist loadfile --no-loadscope-reorder --numprocesses
 MORE  := $(MANY) $(or $(WORKERS),$(shell expr \( 3 \* $(CORES) + 1 \) / 2))
 TWICE := $(MANY) $(or $(WORKERS),$(shell expr 2 \* $(CORES)))
 QUICK := $(MORE) -m "not slow and not thorough"
-READY := [ -e $(CACHE)/collected ] || { $(PYTEST) --collect-only -qq > /dev/null 2>&1; touch $(CACHE)/collected; }
+FIND  := $(PYTEST) --collect-only -qq > /dev/null 2>&1
+READY := [ -e $(CACHE)/collected ] || { $(FIND) tests/[a-d]*/ & half=$$!; $(FIND) tests/[e-z]*/ tests/*.py; \
+    wait $$half; touch $(CACHE)/collected; }
 
 test test-quick: export OPENBLAS_NUM_THREADS := 1
 test: $(VENV)/installed

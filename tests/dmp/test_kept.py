@@ -1057,7 +1057,7 @@ for more in varied.CASES:
     KEPT.case(more)
 
 
-@pytest.mark.sweep(kept=30)
+@pytest.mark.sweep(kept=15)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):

@@ -68,7 +68,7 @@ def test_least_squares_on_unequal_intervals_agree_with_scipys():
     np.testing.assert_allclose(ours.coefficients(x), theirs.c, atol=1e-9)
 
 
-@pytest.mark.sweep(kept=3)
+@pytest.mark.sweep(kept=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("rate", [8.5, 20.0, 100.0, 300.0])

@@ -6,7 +6,7 @@ import pytest
 from dmpcli import extras
 from tests.extras_here import needs
 
-pytestmark = [needs(extras.FAST), pytest.mark.slow]
+pytestmark = [needs(extras.FAST), pytest.mark.thorough]
 
 
 def by_python(heads, numbers):

@@ -596,7 +596,7 @@ for more in varied.CASES:
     KEPT.case(more)
 
 
-@pytest.mark.sweep(kept=20)
+@pytest.mark.sweep(kept=12)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KEPT.cases)
 def test_results_are_those_that_were_kept(name):

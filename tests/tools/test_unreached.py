@@ -65,7 +65,7 @@ def test_what_nothing_uses_is_found_by_its_module_and_what_is_used_is_not(tmp_pa
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_nothing_of_the_package_is_unreached():
     package = unreached.Package(unreached.ROOT)
     found = {name for name, _ in package.unreached()}
