@@ -7,6 +7,7 @@ not, and a direction less is a third of the noise less.
 import numpy as np
 
 from dmpcli.arrays import Floats
+from dmpcli.dmp.knot_refinement import ROUNDING
 from dmpcli.dmp.noise import Noise
 
 # Probability that noise alone is taken for motion.
@@ -33,11 +34,13 @@ def moving_axes(x: Floats, noise: Noise) -> Floats:
     if noise.kind not in ("white", "band"):
         return np.asarray(axes)
     covariance = (noise.axes * noise.sigma**2) @ noise.axes.T
+    # What rounding leaves of a plate that is level is nothing, and of one that is aslant a little.
+    least = ROUNDING * float(np.max(np.abs(x)))
     flat = 0
     while flat < x.shape[1] - 1:
         axis = axes[:, flat]
         # Rounding takes the variance across the only axis that moves below 0.
-        sigma = float(np.sqrt(max(axis @ covariance @ axis, 0.0)))
+        sigma = max(float(np.sqrt(max(axis @ covariance @ axis, 0.0))), least)
         if sigma == 0.0 or not _flat(x @ axis / sigma):
             break
         flat += 1

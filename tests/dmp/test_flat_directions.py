@@ -7,7 +7,7 @@ from scipy.special import chdtri
 from dmpcli.dmp import noise
 from dmpcli.dmp.flat_directions import _flat, moving_axes
 from dmpcli.spatial import rotations
-from tests.dmp.recordings import noisy, six_seconds
+from tests.dmp.recordings import corners, noisy, six_seconds
 
 Q = rotations.from_euler(np.array([0.7, -0.4, 2.1]))
 
@@ -21,6 +21,16 @@ def test_the_height_of_a_flat_stroke_is_flat_in_any_plane():
     kept = [moving(noisy(truth, 0.1, seed) @ Q.T) for seed in range(30)]
     assert sum(axes.shape[1] == 2 for axes in kept) >= 29
     assert np.abs(kept[0].T @ Q[:, 2]).max() < 1e-3
+
+
+def test_without_noise_a_height_that_only_rounding_makes_is_flat_in_any_plane():
+    _, truth = corners()
+    for Q_turned in (np.eye(3), Q, Q @ Q):
+        assert moving(truth @ Q_turned.T).shape == (3, 2)
+    bow = np.sin(np.linspace(0.0, np.pi, len(truth)))
+    raised = truth + np.outer(bow, [0.0, 0.0, 1e-3])
+    for Q_turned in (np.eye(3), Q):
+        assert moving(raised @ Q_turned.T).shape == (3, 3)
 
 
 @pytest.mark.parametrize(("height", "seconds"), [(0.2, 4.0), (0.5, 0.3), (1.0, 0.05)])

@@ -11,6 +11,7 @@ from dmpcli.dmp import least_squares, noise, spline_smoothing
 from dmpcli.dmp.spline_smoothing import _variance, smooth
 from dmpcli.spatial import rotations
 from tests.dmp.recordings import (
+    blended,
     corners,
     filtered,
     handwriting_and_lines,
@@ -252,6 +253,27 @@ def test_a_recording_moved_and_rotated_is_smoothed_alike(angles, seed):
     Q, shift = rotations.from_euler(np.array(angles)), np.array([500.0, -80.0, 1000.0])
     here, there = smoothed(t, points), smoothed(t, points @ Q.T + shift)
     np.testing.assert_allclose(there(t), here(t) @ Q.T + shift, atol=1e-9)
+
+
+TURNED = {
+    "zigzag": corners(),
+    "pen lift": pen_lift(),
+    "legs that turn within 0.1 s": blended(9500, 0.1)[:2],
+    "wave": six_seconds(),
+}
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.1])
+@pytest.mark.parametrize("name", TURNED)
+@given(angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+@settings(max_examples=5)
+def test_a_stroke_with_corners_or_a_lift_is_smoothed_alike_in_any_axes(name, sigma, angles):
+    """A plate that is level has a height of exactly 0 in its own axes and in no others."""
+    t, truth = TURNED[name]
+    points = noisy(truth, sigma, 1) if sigma else truth
+    Q, shift = rotations.from_euler(np.array(angles)), np.array([300.0, -200.0, 100.0])
+    here, there = smoothed(t, points), smoothed(t, points @ Q.T + shift)
+    np.testing.assert_allclose(there(t), here(t) @ Q.T + shift, rtol=0.0, atol=1e-6)
 
 
 def test_scaled_and_reversed_recordings_are_smoothed_alike():
