@@ -4,7 +4,7 @@
 #   make demo        one drag-taught stroke: record, fit, generalize, execute, report
 #   make reproduce   the paper's experiments, flat and curved, target by target
 #   make reproduce-force  force on surfaces that are not where the plan has them, in physics
-#   make test        tests, ruff and import rules, in seven minutes on two cores
+#   make test        tests, ruff and import rules, in six minutes on two cores
 #   make test-quick  the quick half of the tests
 #   make test-thorough  those that take a minute each or go through all cases of a kind
 #   make lint        ruff, import-linter and mypy: make rules and make types
